@@ -40,7 +40,7 @@ impl Terms<'static> {
 
 impl Terms<'_> {
     /// The names that texts may contain in braces.
-    const NAMES: [&'static str; 11] = [
+    const NAMES: [&'static str; 12] = [
         "altimeter",
         "body",
         "body_name",
@@ -49,6 +49,7 @@ impl Terms<'_> {
         "latitude_of_maps",
         "areoid",
         "asp_datum",
+        "record",
         "shot_file",
         "shot_files",
         "shot_source",
@@ -117,6 +118,8 @@ impl Terms<'_> {
             "latitude_of_maps" => "planetographic",
             "areoid" => self.areoid(),
             "asp_datum" => &self.body.map().asp_datum,
+            "record" if self.has_tables => "row of the table of shots, counted from 1",
+            "record" => "record of the PEDR file, counted from 1 with its label records",
             "shot_file" => self.shot_file(),
             "shot_files" if self.has_tables => "tables of shots",
             "shot_files" => "PEDR files",

@@ -118,7 +118,7 @@ pub(super) fn read(path: &Path) -> Result<String, Error> {
         .map_err(IoError::on("read"))
         .in_file(path)?;
     if bytes.len() as u64 > BYTES_MAX {
-        let text = format!("is longer than {BYTES_MAX} bytes; expected the TOML file of one site");
+        let text = format!("is longer than {BYTES_MAX} bytes; expected a configuration in TOML");
         return Err(Problems::of_file(path, &text).into());
     }
     String::from_utf8(bytes).map_err(|error| {

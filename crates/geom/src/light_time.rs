@@ -61,12 +61,12 @@ impl LightTime {
     pub const fn positions(self) -> &'static str {
         match self {
             Self::Surface => {
-                "where the camera was relative to Mars when the light left the ground (light time to the surface and \
+                "where the camera was relative to the body when the light left the ground (light time to the surface and \
                  aberration)"
             }
             Self::None => "geometric, at the exposure (no light time, no aberration)",
             Self::Centre => {
-                "as seen from the centre of Mars with light time and aberration (LT+S), as in ISIS and ALE"
+                "as seen from the centre of the body with light time and aberration (LT+S), as in ISIS and ALE"
             }
             Self::Support => {
                 "as in the support data of the image (neither light time nor aberration is added or removed)"

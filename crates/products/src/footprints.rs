@@ -271,12 +271,9 @@ fn identity<'a>() -> Vec<Column<Shot<'a>>> {
         })
         .in_gis()
         .in_dbase("file", 0, 0),
-        column(
-            "record",
-            Unit::None,
-            "record of the {shot_file}, counted from 1 with its label records",
-            |shot: &Shot| shot.get(|footprints| &footprints.record),
-        )
+        column("record", Unit::None, "{record}", |shot: &Shot| {
+            shot.get(|footprints| &footprints.record)
+        })
         .in_gis()
         .in_dbase("record", 10, 0),
         column(
@@ -312,7 +309,7 @@ fn quality<'a>() -> Vec<Column<Shot<'a>>> {
         column(
             "orbit_quality",
             Unit::None,
-            "0 orbit from JPL, 1 or more: {altimeter} team's gravity model number",
+            "0: orbit from JPL; 1 or more: number of the gravity model of the orbit",
             |shot: &Shot| u32::from(shot.get(|footprints| &footprints.orbit_quality)),
         ),
         column(

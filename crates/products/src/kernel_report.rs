@@ -11,7 +11,8 @@ use super::{
     site::SiteProducts,
 };
 use areograph_base::{
-    kernel_names::quality_of, kernel_source::CkQuality, schema::DocumentSchema, time::Intervals,
+    body::Body, kernel_names::quality_of, kernel_source::CkQuality, schema::DocumentSchema,
+    time::Intervals,
 };
 use areograph_stages::describe_kernels::KernelLine;
 
@@ -184,12 +185,16 @@ fn report<'a>(site: &SiteProducts<'a>) -> Report<'a> {
     };
     let names = site.spacecraft_of_kernels().into_iter();
     let names: Vec<&str> = names.map(|spacecraft| &*spacecraft.full_name).collect();
+    // Images of other bodies have support data.
+    let whose = match site.config.body {
+        Body::Mars => names.join(" or "),
+        Body::Moon => "a spacecraft".to_owned(),
+    };
     let [positions, attitudes] = site.required.of_all();
     let areograph = Extension {
         coverage: format!(
-            "intervals of TDB seconds past J2000 in which the kernel holds {}: its position in an spk, its attitude in \
-             a ck, whose gaps lie between the intervals",
-            names.join(" or ")
+            "intervals of TDB seconds past J2000 in which the kernel contains {whose}: its position in an spk, its attitude in \
+             a ck, whose gaps lie between the intervals"
         ),
         wanted_positions_et_s: ends(&positions),
         wanted_attitudes_et_s: ends(&attitudes),

@@ -12,6 +12,7 @@ use areograph_stages::adjust::PointKind;
 /// Those of `declarations` that `site` has, in the order in which they are written, without the figures of its report.
 #[must_use]
 pub fn listed(site: &SiteProducts, declarations: &[&'static Declaration]) -> Vec<Listed> {
+    let terms = site.config.terms();
     let declared = declarations
         .iter()
         .filter(|declaration| has(site, declaration));
@@ -30,7 +31,7 @@ pub fn listed(site: &SiteProducts, declarations: &[&'static Declaration]) -> Vec
         images.into_iter().map(|image| Listed {
             path: declaration.path_of(image.map_or("", |index| &site.images[index].times.id)),
             image,
-            what: declaration.what,
+            what: terms.fill(declaration.what),
             readers: declaration.readers,
         })
     });

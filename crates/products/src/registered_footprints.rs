@@ -277,12 +277,9 @@ fn shot<'a>() -> Vec<Column<Row<'a>>> {
             "orbit number of the frame",
             |row: &Row| row.site.footprints.orbit[row.footprint],
         ),
-        column(
-            "record",
-            Unit::None,
-            "record of the {shot_file}, counted from 1 with its label records; in a table of shots, the row",
-            |row: &Row| row.site.footprints.record[row.footprint],
-        ),
+        column("record", Unit::None, "{record}", |row: &Row| {
+            row.site.footprints.record[row.footprint]
+        }),
         column(
             "shot",
             Unit::None,

@@ -1,6 +1,6 @@
 //! Inputs of the products of one site.
 
-use std::{collections::BTreeMap, path::Path};
+use std::{borrow::Cow, collections::BTreeMap, path::Path};
 
 use serde::{Deserialize, Serialize};
 
@@ -90,7 +90,7 @@ pub struct Listed {
     /// Index of the image that it belongs to, if it is of one.
     pub image: Option<usize>,
     /// Contents of the file.
-    pub what: &'static str,
+    pub what: Cow<'static, str>,
     /// Readers of it.
     pub readers: &'static str,
 }

@@ -123,7 +123,7 @@ fn products(site: &SiteProducts) -> Markup {
             true,
             [
                 link(&place, &product.path).into(),
-                product.what.into(),
+                (&*product.what).into(),
                 product.readers.into(),
             ],
         );

@@ -25,7 +25,7 @@ use self::{
 use crate::{
     error::ProductError,
     exchange::geopackage::GEOPACKAGE,
-    files::{read_bytes, write_bytes, write_json},
+    files::{read_bytes, write_bytes},
     gis::crs_wkt,
     product::{Content, Context, Declaration, Program, Role, Use, Write},
     registered_footprints,
@@ -41,13 +41,13 @@ const STRETCH: [f64; 2] = [0.02, 0.98];
 
 pub(crate) static PROJECT: Declaration = Declaration {
     path: "exchange/site.qgz",
-    what: "QGIS project of the site: footprints by height, residuals of tie points, outlines, orthoimages, terrain model",
+    what: "QGIS project with the layers that the site has",
     readers: "QGIS",
     rows: "",
     role: Role::Overview,
     content: Content::Foreign,
     write: Write::Where {
-        sites: "a site with images",
+        sites: "a site with an image whose edges see the ground",
         has: has_outlines,
         write: |path, of| write(path, of).map(|()| 0),
     },
@@ -59,18 +59,17 @@ pub(crate) static PROJECT: Declaration = Declaration {
 
 pub(crate) static OUTLINES: Declaration = Declaration {
     path: "exchange/image_outlines.geojson",
-    what: "outlines of the images on the ellipsoid with the orientation of the kernels, as GeoJSON",
+    what: "outlines of the images on the ellipsoid with their initial orientation, as GeoJSON",
     readers: "GIS",
     rows: "images with an outline",
     role: Role::Data,
     content: Content::Foreign,
     write: Write::Where {
-        sites: "a site with images",
+        sites: "a site with an image whose edges see the ground",
         has: has_outlines,
         write: |path, of| {
             let outlines = vectors::outlines(of.site);
-            write_json(path, &outlines)?;
-            Ok(outlines.features.len() as u64)
+            vectors::write(path, of.site, "image_outlines", outlines)
         },
     },
     uses: &[],
@@ -84,12 +83,12 @@ pub(crate) static RESIDUALS: Declaration = Declaration {
     role: Role::Data,
     content: Content::Foreign,
     write: Write::Where {
-        sites: "a site with images and an adjustment",
-        has: |site| has_outlines(site) && site.adjustment().is_some(),
+        sites: "a site with adjusted tie points in images with an outline",
+        has: |site| has_outlines(site) && vectors::has_residuals(site),
         write: |path, of| {
-            let residuals = vectors::residuals(of.site);
-            write_json(path, &residuals)?;
-            Ok(residuals.features.len() as u64)
+            let map = Map::of(of.site);
+            let residuals = vectors::residuals(of.site, &map);
+            vectors::write(path, of.site, "tie_residuals", residuals)
         },
     },
     uses: &[],
@@ -228,9 +227,10 @@ fn layers(of: &Context) -> Result<Vec<Layer>> {
 }
 
 fn is_written(of: &Context, path: &str) -> bool {
-    of.written
-        .iter()
-        .any(|(product, _)| product.path == Path::new(path))
+    of.written.iter().any(|(product, declaration)| {
+        let is_filled = product.rows > 0 || declaration.rows.is_empty();
+        is_filled && product.path == Path::new(path)
+    })
 }
 
 /// Path of a product from the folder of the project.

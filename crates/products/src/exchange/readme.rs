@@ -159,7 +159,7 @@ fn about(program: Program, terms: &Terms<'_>) -> String {
         Program::Gis => format!(
             "GIS: {}, longitudes -180..180, {} latitudes; {}.\n\
              The dates inside the GeoPackage and the shapefile are those of the newest shot.\n\
-             QGIS: Layer > Add Layer > Add Vector Layer, any of these.",
+             QGIS: open site.qgz; single files by Layer > Add Layer > Add Vector Layer.",
             crs_code(body),
             terms.latitude(),
             point_z_height(body)

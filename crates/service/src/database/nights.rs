@@ -52,7 +52,7 @@ pub struct Night {
     pub sites_checked: i64,
     /// Runs that were published.
     pub runs: i64,
-    /// Jobs that failed.
+    /// Jobs that failed, were blocked or produced invalid products.
     pub failures: i64,
 }
 

@@ -1,5 +1,6 @@
 //! The document of a QGIS project (`.qgs`, the layout of version 3.22), with the elements that `QgsProject::read` needs.
 
+use areograph_base::minus::with_minus;
 use maud::{Markup, PreEscaped, html};
 
 use super::map::Map;
@@ -239,12 +240,18 @@ fn classes(column: &str, [least, most]: [f64; 2]) -> Markup {
             ranges {
                 @for class in 0..COLOURS.len() {
                     range symbol=(class) render="true" lower=(edge(class)) upper=(edge(class + 1))
-                        label=(format!("{:.0} to {:.0}", edge(class), edge(class + 1))) {}
+                        label=(format!("{} to {}", whole(edge(class)), whole(edge(class + 1)))) {}
                 }
             }
             symbols { @for (class, colour) in COLOURS.iter().enumerate() { (dot(&class.to_string(), colour)) } }
         }
     }
+}
+
+/// A number of a legend.
+fn whole(value: f64) -> String {
+    // Without the sign of a negative zero.
+    with_minus(&format!("{:.0}", value.round() + 0.0))
 }
 
 #[allow(clippy::cast_precision_loss, reason = "there are five classes")]
@@ -270,8 +277,8 @@ fn arrow(magnification: f64) -> Markup {
     ]);
     let line = html! { (shape) (symbol("@@0@0@0", "fill", "SimpleFill", &filling)) };
     let field = options(&[
-        ("x_attribute", "residual_east_m"),
-        ("y_attribute", "residual_north_m"),
+        ("x_attribute", "residual_map_x_m"),
+        ("y_attribute", "residual_map_y_m"),
         ("vector_field_type", "0"),
         ("scale", &magnification.to_string()),
         ("distance_unit", "MapUnit"),
@@ -304,7 +311,7 @@ fn raster_style(form: &Form) -> Markup {
                     colorrampshader colorRampType="INTERPOLATED" classificationMode="1" clip="0" minimumValue=(least) maximumValue=(most) {
                         @for (index, colour) in COLOURS.iter().enumerate() {
                             @let value = (most - least).mul_add(class_number(index) / 4.0, *least);
-                            item value=(value) color=(hexadecimal(colour)) alpha="255" label=(format!("{value:.0}")) {}
+                            item value=(value) color=(hexadecimal(colour)) alpha="255" label=(whole(value)) {}
                         }
                     }
                 }
