@@ -38,7 +38,7 @@ pub(super) struct Site {
 }
 
 impl Site {
-    /// The images with the orientation of the kernels, in the order of the configuration.
+    /// The images with the orientation from the kernels, in the order of the configuration.
     ///
     /// # Errors
     /// A bug in areograph: they were not entered.

@@ -96,7 +96,7 @@ pub(super) fn ties_of_files<D: Driver>(
     })
 }
 
-/// Tie points matched with the orientation of the kernels, and again with the orientation adjusted by these, which
+/// Tie points matched with the orientation from the kernels, and again with the orientation adjusted by these, which
 /// predicts their positions better.
 fn matched<D: Driver>(
     flow: &mut D,
@@ -217,7 +217,7 @@ fn corrected<D: Driver>(
 }
 
 /// Ground points of the tie points, the internal agreement of every pair of images, and heights against MOLA: with
-/// the orientation of the kernels, or with the adjusted one.
+/// the orientation from the kernels, or with the adjusted one.
 fn intersect<D: Driver>(
     flow: &mut D,
     config: &SiteConfig,
@@ -275,7 +275,7 @@ fn ground<D: Driver>(
     Ok((intersected, of_round(round, pairs)?))
 }
 
-/// A step that belongs to the adjustment unless it uses the orientation of the kernels.
+/// A step that belongs to the adjustment unless it uses the orientation from the kernels.
 fn of_round<T>(round: Round, step: Flow<T>) -> Flow<T> {
     match round {
         Round::Initial => step,
@@ -295,7 +295,7 @@ impl Intersection {
 impl Adjustment {
     /// Enters the outputs in the book of the site.
     fn enter(self, site: &mut Site) -> Result<()> {
-        // There is one adjustment, of the orientation of the kernels.
+        // There is one adjustment, of the orientation from the kernels.
         site.book.enter(Round::Initial, self.adjusted)?;
         site.book.enter_parts(Round::Adjusted, self.tables)?;
         self.intersection.enter(&mut site.book, Round::Adjusted)?;

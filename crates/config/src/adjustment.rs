@@ -170,7 +170,7 @@ declare_table! {
         blunder_limit: Option<f64> = key(from_to(0.0, 1000.0))
             .or(BAARDA_LIMIT)
             .map(|limit| (limit > 0.0).then_some(limit)),
-        /// Height against the MOLA surface, in standard deviations, above which a tie point is a blunder and rejected
+        /// Height above or below the MOLA surface, in standard deviations, beyond which a tie point is rejected as a blunder
         /// unless a neighbour deviates to the same side; 0 keeps all. Not used in the published model.
         height_blunder_limit: Option<f64> = key(from_to(0.0, 1000.0))
             .or(5.0)

@@ -61,7 +61,7 @@ declare_table! {
         laser: CalibrationLaserConfig = table(),
         /// A priori values.
         a_priori: APrioriConfig = table(),
-        /// How it is solved.
+        /// Solution of the calibration.
         solution: SolutionConfig = table(),
         /// Other orbits, to which the result is applied unchanged.
         validation: Vec<ValidationConfig> = tables(Many::ANY),
@@ -191,7 +191,7 @@ declare_table! {
         /// Standard deviation of lines and samples, where the table has none.
         sigma_px: f64 = key(from_to(SIGMA_MIN, 100.0)).or(0.2),
         /// Distance between the images of a tie point and the projections of one ground point by the uncalibrated
-        /// cameras, beyond which the tie point is left out.
+        /// cameras, beyond which the tie point is rejected.
         limit_px: f64 = key(from_to(1.0, 1e4)).or(100.0),
     }
     check something_measures
@@ -277,7 +277,7 @@ declare_table! {
         /// 10 km rectangle on the ground, with all of its shots.
         held_back_every: u32 = key(whole_from_to(2, 100)).or(4),
         /// Distance between a control point and its projection by the uncalibrated cameras, beyond which the point is
-        /// left out.
+        /// rejected.
         limit_px: f64 = key(from_to(1.0, 1e4)).or(300.0),
     }
 }
@@ -288,7 +288,7 @@ declare_table! {
         /// Standard deviation of an orbit coordinate. It is not estimated, since offsets of the camera absorb it; with
         /// `angle_deg` it determines how far a calibration may move the image.
         orbit_bias_m: f64 = key(from_to(1e-3, 1e5)).or(1_000.0),
-        /// Standard deviation of the drift of an orbit coordinate from line to line.
+        /// Standard deviation of the drift of an orbit coordinate per image line.
         orbit_drift_m_per_line: f64 = key(from_to(1e-6, 10.0)).or(0.01),
         /// Standard deviation of an offset angle in the solution by tie points only.
         angle_rad as "angle_deg": f64 =
@@ -305,7 +305,7 @@ declare_table! {
 }
 
 declare_table! {
-    /// How the calibration is solved.
+    /// Solution of the calibration.
     pub struct SolutionConfig {
         /// Parameters that tie points estimate before control is used.
         mode: CalibrationMode = key(words([

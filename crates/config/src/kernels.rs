@@ -28,7 +28,7 @@ const SETS: Many = Many {
 };
 
 declare_table! {
-    /// Where kernels come from, and how coverage is judged: exactly one of `metakernel`, `files`, `root`,
+    /// Source of the kernels, and rules for their coverage: exactly one of `metakernel`, `files`, `root`,
     /// `sets`.
     pub struct KernelsConfig: Deserialize {
         /// The source of the kernel list.

@@ -39,7 +39,7 @@ declare_table! {
         film: FilmConfig = table(),
         /// The map.
         map: MapConfig = table(),
-        /// How the net is solved.
+        /// Solution of the net.
         triangulation: TriangulationConfig = table(),
     }
     check across_tables
@@ -125,7 +125,7 @@ declare_table! {
         /// Standard deviation of a coordinate of a control, its measurement included, where the table has none.
         /// Without it, estimated from the residuals of SCALE at the controls.
         sigma_m: Option<f64> = key(above_to(0.0, 1e7)).unused("2000.0"),
-        /// Residual, in standard deviations of SCALE, beyond which a control is left out. Two gross errors that mask
+        /// Residual, in standard deviations of SCALE, beyond which a control is rejected. Two gross errors that mask
         /// each other are found too, by least median of squares; fewer than five controls cannot be tested.
         limit: f64 = key(from_to(2.5, 1e6)).or(4.0),
     }
@@ -203,7 +203,7 @@ fn mercator_has_an_equator(map: &MapKeys, keys: &mut Keys<'_, '_>) {
 }
 
 declare_table! {
-    /// How the net is solved. The programs are those of Arthur & McMacken 1977.
+    /// Solution of the net. The programs are those of Arthur & McMacken 1977.
     pub struct TriangulationConfig {
         /// Method that positions the pictures on the map.
         method: Method = key(words([

@@ -23,7 +23,7 @@ declare_table! {
         outlier_sigma: f64 = key(above_to(0.0, 1000.0)).or(5.0),
         /// Largest share of outliers. The default is a choice of areograph.
         outlier_share_max: f64 = key(from_to(0.0, 1.0)).or(0.05),
-        /// Fewest shots of a profile that is judged: windows clip profiles, and shorter ones are left out, with a remark. A
+        /// Fewest shots of a profile that is judged: windows clip profiles, and shorter ones are excluded, with a remark. A
         /// site without a longer one is invalid where ranges can be tested. The default is one PEDR frame; the
         /// paper's profiles have 71 to 174.
         shots_min: u32 = key(whole_from_to(2, 1_000_000)).or(20),

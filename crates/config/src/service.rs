@@ -46,15 +46,15 @@ declare_table! {
         schedule: ScheduleConfig = table(),
         /// Files of archives.
         fetch: FetchConfig = table(),
-        /// How changes are found.
+        /// Detection of changes.
         changes: ChangesConfig = table(),
         /// The processes that run sites.
         workers: WorkersConfig = table(),
-        /// What is kept.
+        /// Retention of runs, events, logs and copies.
         retention: RetentionConfig = table(),
-        /// When a site counts as stale.
+        /// Limits beyond which a site counts as stale.
         freshness: FreshnessConfig = table(),
-        /// How far a site may move between two runs before an alert is sent.
+        /// Largest movement of a site between two runs without an alert.
         moved: MovedConfig = table(),
         /// The HTTP service.
         http: HttpConfig = table(),

@@ -30,7 +30,7 @@ pub enum ShotLayout {
 
 declare_table! {
     /// Tables of laser shots (CSV), in place of `[pedr]`: those of other altimeters, or of MOLA from other sources. A
-    /// row is a shot; rows outside all windows are left out, malformed rows are reported with file and line.
+    /// row is a shot; rows outside all windows are excluded; malformed rows are reported with file and line.
     /// Duplicate rows are counted once.
     pub struct ShotTableConfig: Deserialize {
         /// Tables: paths or globs as in `[pedr]`.

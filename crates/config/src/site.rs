@@ -66,7 +66,7 @@ declare_table! {
         /// The same keys and values one by one: dots between tables, elements of lists by their `id`, else
         /// their place from 1.
         keys: BTreeMap<String, String> = of_the_file(),
-        /// Where kernels come from.
+        /// Source of the kernels.
         kernels: KernelsConfig = table(),
         /// Pointing (CK) bias.
         pointing: PointingConfig = table(),

@@ -24,7 +24,7 @@ declare_table! {
         /// ISIS control networks in PVL (a binary one: cnetbin2pvl), whose fixed or constrained points provide their
         /// coordinates, IAU 2000. Lines and samples are counted as in ISIS: the middle of the first pixel is 1.
         /// `serial_number` is an image's `serial_number` above, or its `id`; measurements in other images are counted
-        /// and left out.
+        /// and excluded.
         #[serde(skip)]
         files: Vec<PathBuf> = key(Globs)
             .or(Vec::new())

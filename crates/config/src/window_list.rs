@@ -105,7 +105,7 @@ pub fn window_of_box(id: &str, edges_deg: [f64; 4]) -> Result<WindowConfig, Erro
         return refuse(format!("latitudes {south} and {north}"), expected);
     }
     let Some([west, east]) = wrapped_longitudes([west, east]) else {
-        let expected = "west and east above 0 and at most 360 degrees apart, going east";
+        let expected = "east more than 0 and at most 360 degrees east of west";
         return refuse(format!("longitudes {west} and {east}"), expected);
     };
     let [west_rad, east_rad, south_rad, north_rad] =

@@ -148,7 +148,7 @@ fn bounds(
         if wrapped.is_none() {
             keys.refuse(
                 "longitude_deg",
-                "[west, east], above 0 and at most 360 degrees wide going east",
+                "[west, east], with east more than 0 and at most 360 degrees east of west",
             );
         }
         if wrapped.is_some() {

@@ -67,7 +67,9 @@ pub struct UnreadLine {
 #[cause(Input)]
 pub enum LabelError {
     /// No assignment.
-    #[error("no label found: expected lines KEY = value in the first {LABEL_BYTES_MAX} bytes")]
+    #[error(
+        "no label found: expected lines of the form KEY = value in the first {LABEL_BYTES_MAX} bytes"
+    )]
     #[cause("give a PDS3 label (.lbl, .imq) or an ISIS label (.lbl, .cub)")]
     NoLabel,
     /// An invalid value.

@@ -68,7 +68,7 @@ pub(super) static ATTITUDE: Declaration = Declaration {
 
 pub(super) static POSITION: Declaration = Declaration {
     path: "adjusted/<image>.bsp",
-    what: "adjusted position of the spacecraft from Mars around the image, geometric, J2000 (SPK type 13)",
+    what: "adjusted position of the spacecraft from {body} around the image, geometric, J2000 (SPK type 13)",
     readers: "SPICE, ISIS, ALE",
     rows: "epochs",
     role: Role::Data,

@@ -38,7 +38,7 @@ use readings::OtherReadingDocument;
 #[derive(Serialize, JsonSchema)]
 #[schemars(
     title = "Adjustment of a site",
-    description = "adjustment.json of areograph: tie points intersected with the orientation of the kernels and with the adjusted one, every pair of images compared, and the combined adjustment. Metres, radians, seconds, pixels of the image; unknown values are omitted."
+    description = "adjustment.json of areograph: tie points intersected with the orientation from the kernels and with the adjusted one, every pair of images compared, and the combined adjustment. Metres, radians, seconds, pixels of the image; unknown values are omitted."
 )]
 struct Document<'a> {
     #[schemars(extend("const" = "areograph adjustment 1"))]
@@ -91,7 +91,7 @@ struct StateDocument<'a> {
     heights: HeightDocument<'a>,
 }
 
-/// Heights of tie points against the MOLA surface.
+/// Heights of tie points above the MOLA surface.
 #[derive(Serialize, JsonSchema)]
 struct HeightDocument<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -69,7 +69,7 @@ fn columns<'a>() -> Vec<Column<Pair<'a>>> {
         column(
             "unknown",
             Unit::None,
-            "an unknown: power of t, and X, Y, Z of the position or a rotation about an axis of the camera",
+            "an unknown: constant, linear or quadratic part of X, Y or Z, or of a rotation about a camera axis",
             |row: &Pair| row.unknowns[0].clone(),
         ),
         column(

@@ -20,7 +20,7 @@ use areograph_stages::{
 
 pub(super) static TABLE: Declaration = Declaration {
     path: "height_check.parquet",
-    what: "heights of tie points against the {altimeter} surface, and of footprints that both images of a pair show, \
+    what: "heights of tie points above the {altimeter} surface, and of footprints that both images of a pair show, \
            before and after the adjustment",
     readers: "scripts",
     rows: "tie points and footprints",

@@ -51,7 +51,7 @@ pub(super) static DATA: Declaration = Declaration {
 struct PageConfig {
     /// In TOML: postcard cannot represent infinite or absent values.
     config: String,
-    /// Names of the PEDR files, which the configuration leaves out when it is written.
+    /// Names of the PEDR files, which the serialised configuration omits.
     pedr_files: Vec<String>,
 }
 

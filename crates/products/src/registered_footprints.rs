@@ -113,7 +113,7 @@ struct Row<'a> {
     /// Row of the footprint.
     footprint: usize,
     profile: usize,
-    /// Its place with the orientation of the kernels, and with the adjusted one.
+    /// Its place with the orientation from the kernels, and with the adjusted one.
     places: [Option<Place>; 2],
     /// The footprint after the adjustment.
     adjusted: Option<&'a CorrectedPoint>,
@@ -385,7 +385,7 @@ fn image<'a>() -> Vec<Column<Row<'a>>> {
     columns.push(column(
         "before_inside",
         Unit::None,
-        "whether the footprint lies inside the delivered image with the orientation of the kernels",
+        "whether the footprint lies inside the delivered image with the orientation from the kernels",
         inside(0),
     ));
     columns.push(column(

@@ -110,11 +110,11 @@ pub struct Program {
 pub struct GeometricProducts<'a> {
     /// The tie points.
     pub ties: &'a Ties,
-    /// Their ground points with the orientation of the kernels.
+    /// Their ground points with the orientation from the kernels.
     pub intersected: &'a IntersectedTies,
-    /// Every pair of images with tie points in both, with the orientation of the kernels.
+    /// Every pair of images with tie points in both, with the orientation from the kernels.
     pub pairs: &'a [PairComparison],
-    /// Heights of these points against the MOLA surface.
+    /// Heights of these points above the MOLA surface.
     pub heights: &'a HeightCheck,
     /// `None` if the adjustment failed.
     pub adjustment: Option<AdjustmentProducts<'a>>,
@@ -194,7 +194,7 @@ impl<'a> SiteProducts<'a> {
         !self.footprints.is_empty() && self.config.products.formats.contains(&format)
     }
 
-    /// An output of the orientation of the kernels, or of the site; `None` if the site does not have it.
+    /// An output of the orientation from the kernels, or of the site; `None` if the site does not have it.
     ///
     /// # Errors
     /// An output that cannot be read.

@@ -185,19 +185,19 @@ fn intersected_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column(
             "x_m",
             Unit::Metre,
-            "X of the point intersected with the orientation of the kernels, {frame}, metres",
+            "X of the point intersected with the orientation from the kernels, {frame}, metres",
             |row: &Measurement| Some(row.before?.0.ground.xyz_m[0]),
         ),
         column(
             "y_m",
             Unit::Metre,
-            "Y of the point intersected with the orientation of the kernels, {frame}, metres",
+            "Y of the point intersected with the orientation from the kernels, {frame}, metres",
             |row: &Measurement| Some(row.before?.0.ground.xyz_m[1]),
         ),
         column(
             "z_m",
             Unit::Metre,
-            "Z of the point intersected with the orientation of the kernels, {frame}, metres",
+            "Z of the point intersected with the orientation from the kernels, {frame}, metres",
             |row: &Measurement| Some(row.before?.0.ground.xyz_m[2]),
         ),
         column(
@@ -339,19 +339,19 @@ fn adjusted_sigma_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column(
             "correlation_east_north",
             Unit::None,
-            "correlation of the adjusted point's errors towards east and north, -1 to 1",
+            "correlation of the adjusted point's errors in east and north, -1 to 1",
             |row: &Measurement| Some(local_correlation(row.adjusted?.0, 0, 1)),
         ),
         column(
             "correlation_east_up",
             Unit::None,
-            "correlation of the adjusted point's errors towards east and up, -1 to 1",
+            "correlation of the adjusted point's errors in east and height, -1 to 1",
             |row: &Measurement| Some(local_correlation(row.adjusted?.0, 0, 2)),
         ),
         column(
             "correlation_north_up",
             Unit::None,
-            "correlation of the adjusted point's errors towards north and up, -1 to 1",
+            "correlation of the adjusted point's errors in north and height, -1 to 1",
             |row: &Measurement| Some(local_correlation(row.adjusted?.0, 1, 2)),
         ),
     ]
@@ -414,7 +414,7 @@ fn spherical(point: &CorrectedPoint) -> Spherical {
     Spherical::from_xyz_m(&point.ground.xyz_m)
 }
 
-/// Covariance of errors towards east, north and up, m².
+/// Covariance of errors in east, north and height, m².
 fn local_covariance_m2(point: &CorrectedPoint) -> Matrix3<f64> {
     let to_local = local_axes(&point.ground.xyz_m);
     to_local * point.covariance_m2 * to_local.transpose()

@@ -1,4 +1,4 @@
-//! Heights of tie points against MOLA, and statements of their accuracy.
+//! Heights of tie points above the MOLA surface, and statements of their accuracy.
 
 mod boresight;
 mod profile;

@@ -59,7 +59,7 @@ pub(super) fn figures(site: &SiteProducts, geometric: &GeometricProducts) -> Res
     Ok(html! { (many::some_of_all(site)) div.plots { @for plot in plots { (figure(&plot)?) } } })
 }
 
-/// Footprints around the middle one with the orientation of the kernels and with the adjusted one, so close that
+/// Footprints around the middle one with the orientation from the kernels and with the adjusted one, so close that
 /// the difference is visible.
 fn footprints(before: &ImageProducts, after: &ImageProducts) -> Option<Plot> {
     let samples = f64::from(before.times.samples);

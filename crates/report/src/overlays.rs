@@ -81,7 +81,7 @@ pub fn overlays_page(site: &SiteProducts) -> Result<Option<String>> {
 }
 
 fn lead(site: &SiteProducts) -> Markup {
-    let mut keys = vec!["blue circle: the point from the orientation of the kernels"];
+    let mut keys = vec!["blue circle: the point computed with the orientation from the kernels"];
     if site.adjustment().is_some() {
         keys.push("orange upright cross: the point from the adjusted orientation");
         keys.push("yellow diagonal cross: a measured tie point");

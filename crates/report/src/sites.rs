@@ -37,7 +37,7 @@ pub struct SiteSummary {
     pub counts: [u64; 3],
     /// Mean of range − distance for the profile with the largest |mean|, metres.
     pub range_mean_m: Option<f64>,
-    /// Largest along-track parallax of two images at their tie points, with the orientation of the kernels and the
+    /// Largest along-track parallax of two images at their tie points, with the orientation from the kernels and the
     /// adjusted one, metres.
     pub images_apart_m: [Option<f64>; 2],
     /// Median height of tie points above the MOLA surface, below it negative, likewise, metres.
@@ -94,7 +94,7 @@ pub fn sites_page(sites: &[SiteLine]) -> Result<String> {
     } else {
         Tone::Good
     };
-    let words = "Heights off: median height of the tie points against the laser surface. Images apart: along track, the worst pair. \
+    let words = "Heights off: median height of the tie points above the laser surface. Images apart: along track, the worst pair. \
          Range − distance: the largest mean of a profile.";
     let budgets = sites.iter().filter_map(|site| site.products.as_ref());
     let budgets: Vec<UncertaintyBudget> = budgets.flat_map(|of| of.budgets.clone()).collect();

@@ -117,7 +117,7 @@ impl fmt::Display for BeamGap {
 }
 
 stage_inputs! {
-    /// The images with the orientation of the kernels, footprints, and the laser.
+    /// The images with the orientation from the kernels, footprints, and the laser.
     pub struct CheckBeam<'a> {
         /// The images.
         pub images: SiteImages<'a>,

@@ -1,4 +1,4 @@
-//! Heights of tie points against the ground between MOLA's shots.
+//! Heights of tie points above the ground between MOLA's shots.
 //!
 //! Tie points measure the along-track parallax; across-track errors of the images become height errors that tie points
 //! do not reveal. The altimeter does.

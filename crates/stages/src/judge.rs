@@ -42,7 +42,7 @@ pub struct Evidence<'a> {
     pub terms: Terms<'a>,
     /// Footprints in the windows; `None` for a site without PEDR files.
     pub footprints: Option<usize>,
-    /// Shots in the windows that were left out, by reason.
+    /// Shots in the windows that were rejected, by reason.
     pub rejected: &'a BTreeMap<ShotRejection, u64>,
     /// Which of two radii of the shots represents the ground; `None` where they have one radius.
     pub ground: Option<GroundRadius>,
@@ -56,7 +56,7 @@ pub struct Evidence<'a> {
     pub ranges: &'a RangeCheck,
     /// The configured correction of the clock of MOLA, seconds.
     pub clock_correction_s: f64,
-    /// The images with the orientation of the kernels.
+    /// The images with the orientation from the kernels.
     pub images: &'a [JudgedImage<'a>],
     /// The beam of the laser by the attitude of the images.
     pub beam: BeamEvidence<'a>,
@@ -118,11 +118,11 @@ pub struct AdjustmentEvidence<'a> {
     pub adjusted: &'a Adjusted,
     /// The images with their adjusted orientation.
     pub images: &'a [JudgedImage<'a>],
-    /// Every pair with the orientation of the kernels.
+    /// Every pair with the orientation from the kernels.
     pub pairs: &'a [PairComparison],
     /// Every pair with the adjusted orientation.
     pub adjusted_pairs: &'a [PairComparison],
-    /// Heights of tie points with the orientation of the kernels.
+    /// Heights of tie points with the orientation from the kernels.
     pub heights: &'a HeightCheck,
     /// Heights of the adjusted tie points.
     pub adjusted_heights: &'a HeightCheck,

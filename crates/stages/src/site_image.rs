@@ -10,7 +10,7 @@ use areograph_store::{
     stage::{Input, Inputs, Output, Round},
 };
 
-/// Stage outputs of one image, with the orientation of the kernels or the adjusted one.
+/// Stage outputs of one image, with the orientation from the kernels or the adjusted one.
 #[derive(Debug, Clone)]
 pub struct SiteImage {
     /// Line times.

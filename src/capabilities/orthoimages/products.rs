@@ -65,7 +65,7 @@ pub(super) static SIGMAS: Declaration = Declaration {
 
 pub(super) static DOCUMENT: Declaration = Declaration {
     path: "orthoimages.json",
-    what: "cells of every orthoimage, and the uncertainty of positions in it",
+    what: "cells of every orthoimage, and the uncertainty of positions in each",
     readers: "scripts",
     rows: "orthoimages",
     role: Role::Metadata,
@@ -125,7 +125,7 @@ fn write_brightness(path: &Path, of: &Context, image: &Orthoimage) -> Result<u64
 #[schemars(
     deny_unknown_fields,
     title = "orthoimages.json",
-    description = "orthoimages.json of areograph: cells of every orthoimage of a site, and the uncertainty of positions in it. Metres; unknown values are omitted."
+    description = "orthoimages.json of areograph: cells of every orthoimage of a site, and the uncertainty of positions in each. Metres; unknown values are omitted."
 )]
 struct Document<'a> {
     #[schemars(extend("const" = "areograph orthoimages 1"))]

@@ -16,7 +16,7 @@ pub enum CheckKind {
     Footprints,
     /// A requested adjustment.
     AdjustmentMade,
-    /// Median height of tie points above the MOLA surface, with the orientation of the kernels.
+    /// Median height of tie points above the MOLA surface, with the orientation from the kernels.
     HeightBefore,
     /// Mean difference of the surfaces of two profiles, in standard deviations.
     ProfilesApart,
@@ -61,7 +61,7 @@ pub enum CheckKind {
     PairsJoined,
     /// Distance along the flight between two images at their tie points, adjusted.
     ParallaxAfter,
-    /// The same with the orientation of the kernels.
+    /// The same with the orientation from the kernels.
     ParallaxBefore,
     /// Standard deviation of unit weight of tie points along the track.
     TieResidualsAlong,

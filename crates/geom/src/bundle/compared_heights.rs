@@ -1,4 +1,4 @@
-//! Heights of points against the surface, used in the adjustment or not: each independently, so that there may be many.
+//! Heights of points above the surface, used in the adjustment or not: each independently, so that there may be many.
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -14,7 +14,7 @@ use crate::pushbroom::ExteriorOrientation;
 const TOGETHER: usize = 64;
 
 impl HeightResidual {
-    /// Standard deviation of the height against the surface from the point's own rays, metres.
+    /// Standard deviation of the height above the surface from the point's own rays, metres.
     #[must_use]
     pub fn sigma_m(&self) -> f64 {
         self.surface_sigma_m.hypot(self.ray_sigma_m)

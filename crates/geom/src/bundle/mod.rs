@@ -336,7 +336,7 @@ impl Residual {
     }
 }
 
-/// Height of an adjusted point against the surface.
+/// Height of an adjusted point above the surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeightResidual {
     /// Index of the point.

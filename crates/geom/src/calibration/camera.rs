@@ -100,7 +100,7 @@ impl LineCamera {
 pub struct CalibrationState {
     /// The lines of the camera.
     pub cameras: Vec<LineCamera>,
-    /// Drift of the orbit from line to line, body-fixed metres: the same for all lines of the camera, as they fly
+    /// Drift of the orbit, body-fixed, metres per image line: the same for all lines of the camera, as they fly
     /// together. The constant part of an orbit's error is not separable from the offsets, which absorb it.
     pub drift_m_per_line: [f64; 3],
 }

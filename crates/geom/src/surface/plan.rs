@@ -1,4 +1,4 @@
-//! Planimetric coordinates towards east and north from the middle of a site.
+//! Planimetric coordinates, east and north of the middle of a site.
 
 use nalgebra::{Vector2, Vector3};
 

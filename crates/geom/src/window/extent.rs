@@ -10,7 +10,7 @@ use areograph_base::units::wrap_two_pi;
 pub struct Extent {
     /// Western edge.
     pub west_rad: f64,
-    /// Width going east, not negative.
+    /// Width from west to east, not negative.
     pub width_rad: f64,
     /// Southern edge.
     pub south_rad: f64,

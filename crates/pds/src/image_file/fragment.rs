@@ -60,7 +60,7 @@ pub(super) struct Fragment {
     pub(super) number: u16,
     /// Byte of the file where its header begins.
     pub(super) at: u64,
-    /// Data bytes after the header that are in the file.
+    /// Number of data bytes that follow the header in the file.
     pub(super) data_bytes: u64,
     /// First line and number of lines; valid for transform fragments.
     pub(super) first_line: u32,

@@ -4,7 +4,7 @@
 pub(super) const DEFINITIONS: [(&str, &str); 15] = [
     (
         "before, after",
-        "with the orientation of the kernels, and with the adjusted one; ground points are intersected again",
+        "with the orientation from the kernels, and with the adjusted one; ground points are intersected again",
     ),
     (
         "focal",

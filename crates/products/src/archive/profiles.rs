@@ -137,7 +137,7 @@ fn ranges<'a>() -> Vec<Column<&'a ArchiveProfile>> {
         checked(
             "mean_m",
             Unit::Metre,
-            "mean of range minus distance from the kernels' spacecraft to the raw footprint; missing where no shot was checked",
+            "mean of range minus distance between spacecraft (kernels) and raw footprint; missing where no shot was checked",
             |row| row.range_minus_distance_m.mean,
         ),
         checked(
@@ -191,7 +191,7 @@ fn ranges<'a>() -> Vec<Column<&'a ArchiveProfile>> {
         checked(
             "decoding_mean_m",
             Unit::Metre,
-            "mean of range minus distance from the file's own spacecraft to the raw footprint",
+            "mean of range minus distance between spacecraft (PEDR file) and raw footprint",
             |row| row.decoding_mean_m,
         ),
         checked(

@@ -118,20 +118,20 @@ fn columns() -> Vec<Column<CheckedShot>> {
         column(
             "range_minus_distance_m",
             Unit::Metre,
-            "range minus distance from the kernels' spacecraft to the raw footprint; missing where the kernels have no position",
+            "range minus distance between spacecraft (kernels) and raw footprint; missing where the kernels have no position",
             |row: &Row| Some(row.residuals?.range_minus_distance_m),
         ),
         column(
             "range_minus_distance_crossover_m",
             Unit::Metre,
-            "range minus distance from the kernels' spacecraft to the crossover-corrected footprint; missing where the \
+            "range minus distance between spacecraft (kernels) and crossover-corrected footprint; missing where the \
              kernels have no position",
             |row: &Row| Some(row.residuals?.range_minus_distance_crossover_m),
         ),
         column(
             "decoding_m",
             Unit::Metre,
-            "range minus distance from the file's own spacecraft to the raw footprint",
+            "range minus distance between spacecraft (PEDR file) and raw footprint",
             |row: &Row| Some(row.residuals?.decoding_m),
         ),
         column(

@@ -56,8 +56,8 @@ struct Document<'a> {
     /// The lines of the camera.
     #[schemars(length(min = 2))]
     cameras: Vec<CameraDocument<'a>>,
-    /// Drift of the orbit from line to line, body-fixed, metres: true minus the support data that were given. The
-    /// constant part of the orbit's error is in the offset angles.
+    /// Drift of the orbit, body-fixed, metres per image line: true minus the support data that were given. The
+    /// offset angles absorb the constant part of the orbit error.
     drift_m_per_line: [Value; 3],
     /// Offset angles as determined by tie points only.
     tie_sight: TieSightDocument,
@@ -132,7 +132,7 @@ struct RoundDocument {
     held_back_scatter: Option<Scatter>,
     /// φ, ω and κ of every line, degrees, in the order of `cameras`.
     angles_deg: Vec<[f64; 3]>,
-    /// Drift of the orbit from line to line, body-fixed, metres.
+    /// Drift of the orbit, body-fixed, metres per image line.
     drift_m_per_line: [f64; 3],
 }
 

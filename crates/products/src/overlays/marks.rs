@@ -14,7 +14,7 @@ pub(super) struct MarkedFootprint {
     pub(super) number: usize,
     /// Row of the footprint.
     pub(super) row: u32,
-    /// With the orientation of the kernels.
+    /// With the orientation from the kernels.
     pub(super) before: Option<[f64; 2]>,
     /// With the adjusted one.
     pub(super) after: Option<[f64; 2]>,

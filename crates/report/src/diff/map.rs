@@ -11,7 +11,7 @@ use crate::{
 use areograph_base::{error::Result, units::METRES_PER_KM};
 use areograph_geom::ellipsoid::local_axes;
 
-/// Movements below this are not drawn, metres: below the accuracy of any kernel.
+/// Smallest movement that is drawn, metres: less than the error of any kernel.
 const DRAWN_FROM_M: f64 = 1e-3;
 /// Share of the map's side that the longest vector takes.
 const LONGEST: f64 = 0.12;

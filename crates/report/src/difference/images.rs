@@ -70,11 +70,11 @@ pub struct ImageMovement {
     pub time_s: Component,
     /// Distance between the perspective centres.
     pub distance_m: Size,
-    /// Perspective centre, away from Mars.
+    /// Shift of the perspective centre away from Mars.
     pub radial_m: Component,
-    /// Perspective centre, along the flight.
+    /// Shift of the perspective centre along the flight.
     pub along_m: Component,
-    /// Perspective centre, along the orbit's angular momentum.
+    /// Shift of the perspective centre along the orbit's angular momentum.
     pub cross_m: Component,
     /// Angle of the whole turn.
     pub turn_arcsec: Size,

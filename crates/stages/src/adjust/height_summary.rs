@@ -1,4 +1,4 @@
-//! Heights of tie points against the MOLA surface, as the adjustment observes them.
+//! Heights of tie points above the MOLA surface, as the adjustment observes them.
 
 use nalgebra::Vector3;
 use schemars::JsonSchema;
@@ -20,7 +20,7 @@ use areograph_geom::{
 const CHANCE_KEPT: usize = 1;
 const CHANCE_ALL: usize = 2;
 
-/// Heights of tie points against the MOLA surface, as observations.
+/// Heights of tie points above the MOLA surface, as observations.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct HeightSummary {
     /// Tie points whose height is observed.

@@ -25,7 +25,7 @@ stage_inputs! {
     pub struct Adjust<'a> {
         /// Purpose of the adjustment.
         pub round: Round,
-        /// The images with the orientation of the kernels.
+        /// The images with the orientation from the kernels.
         pub images: SiteImages<'a>,
         /// Footprints in IAU 2000.
         pub converted: &'a Output<Converted>,

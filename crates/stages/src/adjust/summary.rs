@@ -92,7 +92,7 @@ pub struct TypeSummary {
     #[schemars(range(min = 0.0))]
     pub variance_component: f64,
     /// Interval that holds 99 % of such values when the standard deviations are right, from the χ² distribution; 0
-    /// where the redundancy is below 1. With robust weights or overestimated roughness, heights fall below it.
+    /// where the redundancy is below 1. With robust weights or overestimated roughness, the value for heights is below it.
     #[schemars(transform = none_negative)]
     pub variance_component_limits: [f64; 2],
     /// Observations whose standardised residual exceeds 3.29.

@@ -13,7 +13,7 @@ use areograph_geom::calibration::TieSight;
 pub struct Calibration {
     /// The lines of the camera.
     pub cameras: Vec<CameraResult>,
-    /// Drift of the orbit from line to line, body-fixed, metres; the calibrated support data contain it.
+    /// Drift of the orbit, body-fixed, metres per image line; the calibrated support data contain it.
     pub drift_m_per_line: [Value; 3],
     /// Sensitivity of tie points to the offset angles.
     pub tie_sight: TieSight,
@@ -35,7 +35,7 @@ pub struct Calibration {
     pub images: Vec<ImageResult>,
     /// Whether the result is to be used.
     pub verdict: Verdict,
-    /// Rows and points that were left out, one sentence each.
+    /// Rows and points that were excluded, one sentence each.
     pub complaints: Vec<String>,
     /// Number of all complaints.
     pub complaint_count: u64,
@@ -46,7 +46,7 @@ pub struct Calibration {
 pub struct TieGround {
     /// Tie points that were tested last.
     pub tested: u64,
-    /// Height above or below the ground, in standard deviations, beyond which a tie point is left out.
+    /// Height above or below the ground, in standard deviations, beyond which a tie point is rejected.
     #[schemars(range(min = 0.0))]
     pub limit_sigmas: f64,
     /// This limit in metres, for the median of the tie points: smaller errors along the flight are not identified.
@@ -263,7 +263,7 @@ pub struct CalibrationRound {
     pub held_back_scatter: Option<Scatter>,
     /// φ, ω and κ of every line, radians.
     pub angles_rad: Vec<[f64; 3]>,
-    /// Drift of the orbit, metres a line.
+    /// Drift of the orbit, body-fixed, metres per image line.
     pub drift_m_per_line: [f64; 3],
 }
 
@@ -335,7 +335,7 @@ pub struct PointResult {
     pub point: String,
     /// Its use.
     pub kind: PointKind,
-    /// Whether it was left out.
+    /// Whether it was rejected.
     pub left_out: bool,
     /// East longitude, latitude, radians, and radius, metres, intersected from its images; `None` where they are too
     /// few, and for a point that was left out.
@@ -358,7 +358,7 @@ pub struct ImageResult {
     pub camera: String,
     /// Line and sample.
     pub place: [f64; 2],
-    /// Whether it was left out.
+    /// Whether it was rejected.
     pub left_out: bool,
     /// Residual across and along the flight with the laboratory's geometry, pixels: at the intersected position, or at
     /// the laser's for a laser point.

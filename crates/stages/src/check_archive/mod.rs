@@ -103,7 +103,7 @@ pub struct FileRanges {
     pub shots: u64,
     /// Shots without a position in the kernels.
     pub not_covered: u64,
-    /// Shots that were left out, by reason.
+    /// Shots that were rejected, by reason.
     pub rejected: BTreeMap<ShotRejection, u64>,
     /// Complaints about records and label.
     pub complaint_count: u64,

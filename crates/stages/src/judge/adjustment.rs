@@ -31,7 +31,7 @@ impl AdjustmentEvidence<'_> {
         let mut invalid = self.heights_off(evidence);
         let reasons = |image: &JudgedImage| -> Vec<String> {
             let id = image.id();
-            // Faults of the orientation of the kernels are reported with it.
+            // Faults of the orientation from the kernels are reported with it.
             let of_model = image.model.invalid_because.iter();
             of_model
                 .map(|reason| format!("adjusted image {id}: {reason}"))

@@ -24,7 +24,7 @@ const EXPECTED_MIN: u32 = 5;
 /// The evidence of the laser's beam.
 #[derive(Debug, Clone, Copy)]
 pub struct BeamEvidence<'a> {
-    /// The images with the orientation of the kernels.
+    /// The images with the orientation from the kernels.
     pub images: &'a [ImageBeam],
     /// A priori standard deviations of attitude and boresight.
     pub adjustment: &'a AdjustmentConfig,

@@ -11,7 +11,7 @@ pub const CHIP_EDGE: usize = 141;
 /// The meaning of a mark.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Mark {
-    /// Place at which the image sees the point with the orientation of the kernels.
+    /// Place at which the image sees the point with the orientation from the kernels.
     Before,
     /// Place at which the image sees the point with the adjusted orientation.
     After,

@@ -109,7 +109,7 @@ impl Overlays {
 stage_inputs! {
     /// Images with pixels, and the places shown in them.
     pub struct LayOverlays<'a> {
-        /// Images with the orientation of the kernels.
+        /// Images with the orientation from the kernels.
         pub images: SiteImages<'a>,
         /// Images with the adjusted orientation; empty without an adjustment.
         pub adjusted_images: SiteImages<'a>,
@@ -129,7 +129,7 @@ stage_inputs! {
 pub struct MeasuredTies<'a> {
     /// The tie points.
     pub ties: &'a Output<Ties>,
-    /// Their ground points with the orientation of the kernels.
+    /// Their ground points with the orientation from the kernels.
     pub intersected: &'a Output<IntersectedTies>,
     /// The adjustment, and their ground points with its orientation.
     pub adjusted: Option<(&'a Output<Adjusted>, &'a Output<IntersectedTies>)>,

@@ -51,7 +51,7 @@ pub enum Subject {
 #[derive(Debug)]
 pub(super) struct Wanted {
     pub(super) subject: Subject,
-    /// Its position with the orientation of the kernels and with the adjusted orientation.
+    /// Its position with the orientation from the kernels and with the adjusted orientation.
     pub(super) ground_m: [Option<Vector3<f64>>; 2],
     /// Images, with line and sample where it was measured in them.
     pub(super) images: Vec<(usize, Option<Vector2<f64>>)>,

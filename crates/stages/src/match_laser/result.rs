@@ -128,7 +128,7 @@ pub struct LaserMatch {
     pub images: Vec<String>,
     /// The verdict.
     pub verdict: Verdict,
-    /// Records and points that were left out.
+    /// Records and points that were excluded.
     pub complaints: Vec<String>,
     /// Their number.
     pub complaint_count: u64,

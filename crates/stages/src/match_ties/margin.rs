@@ -22,7 +22,7 @@ pub struct Margin {
 }
 
 impl Margin {
-    /// The margin of the site's images with the orientation of the kernels, or with the adjusted one.
+    /// The margin of the site's images with the orientation from the kernels, or with the adjusted one.
     #[must_use]
     pub fn of(site: &SiteConfig, round: Round) -> Self {
         let config = &site.adjustment;

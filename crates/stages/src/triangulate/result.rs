@@ -24,7 +24,7 @@ pub struct Triangulation {
     pub totals: Totals,
     /// Whether the result is to be used.
     pub verdict: Verdict,
-    /// Rows that were left out, one sentence each.
+    /// Rows that were excluded, one sentence each.
     pub complaints: Vec<String>,
     /// Number of all complaints.
     pub complaint_count: u64,
@@ -102,7 +102,7 @@ pub struct MeasurementResult {
     pub redundancy: f64,
     /// Whether it is beyond 3.5 robust standard deviations of its brick.
     pub flagged: bool,
-    /// Whether it was left out as a blunder.
+    /// Whether it was rejected as a blunder.
     pub removed: bool,
 }
 
@@ -132,7 +132,7 @@ pub struct ControlResult {
     pub kept: bool,
 }
 
-/// A brick: a line of table 1 of the paper.
+/// A brick, as a row of Table 1 of Arthur & McMacken 1977.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct BrickResult {
     /// Its name.
@@ -151,7 +151,7 @@ pub struct BrickResult {
     pub robust_sigma_m: f64,
     /// Measurements beyond 3.5 of these that are still in use.
     pub flagged: u32,
-    /// Measurements that were left out.
+    /// Measurements that were rejected.
     pub removed: u32,
     /// Shrinkage that the two approximate points of a brick cause, before its reversal.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
@@ -207,11 +207,11 @@ pub struct Totals {
     pub control_rms_m: [f64; 2],
     /// Root mean square of the deviations in use, X and Y, metres.
     pub deviation_rms_m: [f64; 2],
-    /// Measurements that were left out.
+    /// Measurements that were rejected.
     pub removed: u64,
     /// Measurements that are flagged and in use.
     pub flagged: u64,
-    /// Controls that were left out.
+    /// Controls that were rejected.
     pub rejected_controls: u64,
     /// Largest standard deviation of a coordinate of a point, metres; absent when none is known.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]

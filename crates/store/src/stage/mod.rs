@@ -27,12 +27,12 @@ pub use reason::Reason;
 
 use areograph_base::{error::Result, watch::Watch};
 
-/// Whether a stage works on the orientation of the kernels or on the adjusted one.
+/// Whether a stage works on the orientation from the kernels or on the adjusted one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Round {
-    /// The orientation of the kernels.
+    /// The orientation from the kernels.
     Initial,
-    /// An adjustment by tie points that were matched with the orientation of the kernels, made to match them again.
+    /// An adjustment by tie points that were matched with the orientation from the kernels, made to match them again.
     Matching,
     /// The adjusted orientation.
     Adjusted,
