@@ -339,8 +339,8 @@ fn errors_in_the_plane_do_not_hide_behind_those_in_height() {
         assert!(!found.verdict.valid, "{vertical_m}: {plane} {height}");
         let reasons = found.verdict.reasons.concat();
         assert!(
-            reasons.contains("withheld control in the plane")
-                && reasons.contains("used control in the plane"),
+            reasons.contains("horizontal residuals of the withheld control")
+                && reasons.contains("horizontal residuals of the control used"),
             "{reasons}"
         );
         assert!(!reasons.contains("in height"), "{reasons}");

@@ -159,7 +159,10 @@ mod tests {
                 "latitudes 2 and 1; expected -90 to 90",
             ),
             ([0.0, 1.0, f64::NAN, 1.0], "latitudes NaN and 1"),
-            ([5.0, 5.0, 0.0, 1.0], "west and east above 0"),
+            (
+                [5.0, 5.0, 0.0, 1.0],
+                "east more than 0 and at most 360 degrees east of west",
+            ),
         ] {
             let failure = window_of_box("a", edges).unwrap_err();
             assert!(failure.to_string().contains(expected), "{failure}");
