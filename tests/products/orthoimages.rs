@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may fail loudly")]
 
-use std::{collections::BTreeMap, fs::File};
+use std::{collections::BTreeMap, fs::File, path::Path};
 
 use areograph::{
     capabilities::{self, write_products},
@@ -20,7 +20,10 @@ use tiff::{
     tags::Tag,
 };
 
-use crate::common::{self, products_site::Site};
+use crate::{
+    common::{self, products_site::Site},
+    qgis::{in_qgis, layers_refer_to_products},
+};
 
 /// Rows and columns of the orthoimage, and of the terrain model, whose cells are twice as large.
 const SIZE: [usize; 2] = [6, 8];
@@ -162,6 +165,8 @@ fn files_and_page_state_what_was_computed() {
     };
     assert_eq!(bytes, orthoimages[0].brightness);
 
+    rasters_are_layers_of_the_project(&folder.path().join("exchange/site.qgz"), &id);
+
     let document = common::json(&folder.path().join("orthoimages.json"));
     let stated = &document["orthoimages"][0];
     assert_eq!(stated["image"], json!(id));
@@ -173,6 +178,30 @@ fn files_and_page_state_what_was_computed() {
         assert!(row.contains(&format!(">{number}<")), "{number}: {row}");
     }
     assert!(row.contains("not known"), "{row}");
+}
+
+/// The orthoimage, and below it the terrain model twice, on the map of their files.
+fn rasters_are_layers_of_the_project(project: &Path, id: &str) {
+    let sources = layers_refer_to_products(project);
+    let orthoimage = format!("../images/{id}/orthoimage.tif");
+    let rasters = [&*orthoimage, "../surface.tif", "../surface.tif"];
+    assert_eq!(sources[sources.len() - 3..], rasters);
+    let Some(found) = in_qgis(project, "orthoimages in QGIS") else {
+        return;
+    };
+    let layers = found["layers"].as_array().unwrap();
+    let renderers = ["singlebandgray", "singlebandpseudocolor", "hillshade"];
+    for (layer, renderer) in layers[layers.len() - 3..].iter().zip(renderers) {
+        assert_eq!(
+            (&layer["valid"], &layer["renderer"]),
+            (&json!(true), &json!(renderer))
+        );
+        let crs = layer["crs"].as_str().unwrap();
+        assert!(
+            crs.starts_with("+proj=eqc +lat_ts=0 ") && crs.contains("+R=3396190"),
+            "{crs}"
+        );
+    }
 }
 
 #[test]

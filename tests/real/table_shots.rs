@@ -241,32 +241,26 @@ const FOREIGN: [&str; 9] = [
 /// Pages, documents, tables with their metadata, and text: none contains a word of another body or altimeter.
 fn texts_use_the_terms_of_the_site(out: &Path) {
     let mut read = 0;
-    let mut folders = vec![out.to_owned()];
-    while let Some(folder) = folders.pop() {
-        for entry in std::fs::read_dir(folder).unwrap() {
-            let path = entry.unwrap().path();
-            if path.is_dir() {
-                folders.push(path);
-                continue;
-            }
-            let kind = path.extension().and_then(|of| of.to_str());
-            let bytes = std::fs::read(&path).unwrap();
-            let is_read = matches!(
-                kind,
-                Some("html" | "json" | "geojson" | "txt" | "csv" | "xml" | "parquet" | "svg")
-            );
-            // Names of the program and of its folders are no terms.
-            let text = String::from_utf8_lossy(&bytes).replace("areograph", "");
-            // The source of default standard deviations.
-            let text = text.replace("Mars Global Surveyor", "");
-            for word in FOREIGN.iter().filter(|_| is_read) {
-                let at = text.find(word);
-                let near = at.map(|at| text[..at].chars().rev().take(60).collect::<String>());
-                let near = near.map(|near| near.chars().rev().collect::<String>());
-                assert!(at.is_none(), "{}: …{near:?}{word}", path.display());
-            }
-            read += usize::from(is_read);
+    for path in common::files_below(out) {
+        let kind = path.extension().and_then(|of| of.to_str());
+        if !matches!(
+            kind,
+            Some("html" | "json" | "geojson" | "txt" | "csv" | "xml" | "parquet" | "svg")
+        ) {
+            continue;
         }
+        let bytes = std::fs::read(&path).unwrap();
+        // The program, and the source of default standard deviations, are no terms.
+        let text = String::from_utf8_lossy(&bytes)
+            .replace("areograph", "")
+            .replace("Mars Global Surveyor", "");
+        for word in FOREIGN {
+            let before = text.split_once(word).map(|(before, _)| before);
+            let near = before.map(|before| before.chars().rev().take(60).collect::<String>());
+            let near = near.map(|near| near.chars().rev().collect::<String>());
+            assert!(near.is_none(), "{}: …{near:?}{word}", path.display());
+        }
+        read += 1;
     }
     assert!(read > 20, "{read} files");
 }

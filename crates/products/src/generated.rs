@@ -229,7 +229,15 @@ mod tests {
         });
         for text in texts {
             let text = lunar.fill(&text).replace("areograph", "");
-            assert!(!Terms::is_unfilled(&text), "{text}");
+            // A name in braces that is left is misspelt; programs of AWK have blanks in theirs.
+            let mut parts = text
+                .split('{')
+                .skip(1)
+                .filter_map(|part| part.split_once('}'));
+            let is_name = |(name, _): (&str, &str)| {
+                name.chars().all(|of| of.is_ascii_lowercase() || of == '_')
+            };
+            assert!(!parts.any(is_name), "{text}");
             for word in ["MOLA", "PEDR", "Mars", "MARS", "IAU 2000", "areo"] {
                 assert!(!text.contains(word), "{text}");
             }

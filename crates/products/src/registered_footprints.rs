@@ -30,7 +30,7 @@ const ISIS_OFFSET: f64 = 0.5;
 /// Sites with these products.
 const SITES: &str = "a site with footprints inside its images";
 /// Table of the GeoPackage.
-const LAYER: &str = "registered_footprints";
+pub(super) const LAYER: &str = "registered_footprints";
 const WHAT: &str = "footprints inside images: ground coordinates, and image coordinates before and after the adjustment";
 
 pub(super) static PARQUET: Declaration = Declaration {
@@ -101,9 +101,9 @@ fn has(site: &SiteProducts) -> bool {
     !site.footprints.is_empty() && images.any(|image| image.registration.points.inside_count() > 0)
 }
 
-/// Table of the `GeoPackage`, and the heights in it, metres.
-pub(super) fn heights_m(site: &SiteProducts) -> (&'static str, Vec<f64>) {
-    (LAYER, rows(site).iter().map(Row::height_m).collect())
+/// The column `height_m`: heights above the sphere of the maps, metres.
+pub(super) fn heights_m<'a>(site: &'a SiteProducts<'a>) -> impl Iterator<Item = f64> {
+    rows(site).into_iter().map(|row| row.height_m())
 }
 
 /// A footprint that an image shows.

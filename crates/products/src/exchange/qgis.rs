@@ -53,7 +53,7 @@ pub(crate) static PROJECT: Declaration = Declaration {
     },
     uses: &[Use {
         program: Program::Gis,
-        lines: "qgis site.qgz                                    QGIS project with all layers",
+        lines: "qgis site.qgz                                    QGIS project with these layers on one map",
     }],
 };
 
@@ -141,18 +141,17 @@ fn layers(of: &Context) -> Result<Vec<Layer>> {
     let geographic = || crs_wkt(site.config.body);
     let mut layers = Vec::new();
     if is_written(of, RESIDUALS.path) {
+        let magnification = vectors::magnification(site);
         layers.push(Layer {
-            name: "Residuals of tie points".to_owned(),
+            name: format!("Residuals of tie points, × {magnification}"),
             source: source(RESIDUALS.path),
             wkt: geographic(),
             is_shown: true,
-            form: Form::Arrows {
-                magnification: vectors::magnification(site),
-            },
+            form: Form::Arrows { magnification },
         });
     }
     if is_written(of, registered_footprints::GEOPACKAGE.path) {
-        let (table, heights_m) = registered_footprints::heights_m(site);
+        let table = registered_footprints::LAYER;
         layers.push(Layer {
             name: format!("{} footprints inside images, height in m", terms.altimeter),
             source: format!(
@@ -163,7 +162,7 @@ fn layers(of: &Context) -> Result<Vec<Layer>> {
             is_shown: true,
             form: Form::Heights {
                 column: "height_m",
-                range: range(heights_m.into_iter()),
+                range: range(registered_footprints::heights_m(site)),
             },
         });
     }

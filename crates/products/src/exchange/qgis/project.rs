@@ -1,11 +1,11 @@
 //! The document of a QGIS project (`.qgs`, the layout of version 3.22), with the elements that `QgsProject::read` needs.
 
 use areograph_base::minus::with_minus;
-use maud::{Markup, PreEscaped, html};
+use maud::{Markup, html};
 
 use super::map::Map;
 
-/// Layout that the document follows; later versions of QGIS read it as well.
+/// Layout that the document follows.
 const VERSION: &str = "3.22.16";
 /// Five colours of the scale viridis, from low to high.
 const COLOURS: [&str; 5] = [
@@ -124,11 +124,8 @@ fn system(wkt: &str, is_geographic: bool) -> Markup {
 
 fn layer_element(id: &str, layer: &Layer) -> Markup {
     let form = &layer.form;
-    let kind = if form.geometry().is_some() {
-        "vector"
-    } else {
-        "raster"
-    };
+    let is_vector = form.geometry().is_some();
+    let kind = if is_vector { "vector" } else { "raster" };
     let blend = if matches!(form, Form::Terrain { .. }) {
         MULTIPLY
     } else {
@@ -144,13 +141,12 @@ fn layer_element(id: &str, layer: &Layer) -> Markup {
             id { (id) }
             datasource { (layer.source) }
             layername { (layer.name) }
-            srs { (system(&layer.wkt, form.geometry().is_some())) }
-            @if form.geometry().is_some() {
-                provider encoding="UTF-8" { "ogr" }
+            srs { (system(&layer.wkt, is_vector)) }
+            provider encoding="UTF-8" { (form.provider()) }
+            @if is_vector {
                 (vector_style(form))
                 layerGeometryType { (if form.geometry() == Some("Point") { "0" } else { "2" }) }
             } @else {
-                provider { "gdal" }
                 pipe { (raster_style(form)) }
             }
             blendMode { (blend) }
@@ -324,10 +320,10 @@ fn raster_style(form: &Form) -> Markup {
 }
 
 /// `r,g,b,a` as `#rrggbb`.
-fn hexadecimal(colour: &str) -> PreEscaped<String> {
+fn hexadecimal(colour: &str) -> String {
     let parts = colour
         .split(',')
         .take(3)
         .filter_map(|part| part.parse::<u8>().ok());
-    PreEscaped(parts.fold("#".to_owned(), |text, part| format!("{text}{part:02x}")))
+    parts.fold("#".to_owned(), |text, part| format!("{text}{part:02x}"))
 }
