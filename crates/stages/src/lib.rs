@@ -1,14 +1,13 @@
 //! The stages of the flow: plain functions from typed input to typed output.
 //!
 //! No stage calls another, writes to the terminal, or knows another's files. The flow of the program puts them in
-//! order.
+//! order. Modules that serve several stages are in `shared`.
 //!
 //! `read_ties` and `group_profiles` find the images of measurements and profiles once. From there on, images, profiles,
 //! tie points and footprints are indices in the order of the site; identifiers are for messages and products.
 
 pub mod adjust;
 pub mod calibrate;
-pub mod camera_lines;
 pub mod check_archive;
 pub mod check_beam;
 pub mod check_heights;
@@ -19,22 +18,13 @@ pub mod compare_pairs;
 pub mod convert_datum;
 pub mod describe_kernels;
 pub mod fit_sensor_model;
-pub(crate) mod ground;
 pub mod group_profiles;
-pub mod image_pixels;
-pub(crate) mod image_view;
 pub mod intersect;
-#[cfg(test)]
-mod invented_pair;
 pub mod judge;
 pub mod lay_overlays;
-pub mod line_camera;
 pub mod map_surface;
 pub mod match_laser;
 pub mod match_ties;
-pub mod mola_surface;
-pub mod orientation;
-pub mod oriented;
 pub mod outline_windows;
 pub mod read_shots;
 pub mod read_ties;
@@ -43,9 +33,15 @@ pub mod register;
 pub mod reorient;
 pub mod sample_orientation;
 pub mod search_footprints;
-pub(crate) mod shot_heights;
-pub mod site_image;
+mod shared;
 pub mod tabulate_kernels;
 pub mod tag_times;
 pub mod tag_utc;
 pub mod triangulate;
+
+#[cfg(test)]
+use shared::invented_pair;
+pub use shared::{
+    camera_lines, image_pixels, line_camera, mola_surface, orientation, oriented, site_image,
+};
+use shared::{ground, image_view, shot_heights};

@@ -4,7 +4,8 @@ use std::sync::OnceLock;
 
 use nalgebra::Vector3;
 
-use super::{calibrate::Calibration, line_camera::LineCamera};
+use super::line_camera::LineCamera;
+use crate::calibrate::Calibration;
 use areograph_base::{
     body::Body,
     error::{Cause, Locate as _, Result},

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use nalgebra::Vector3;
 
-use super::group_profiles::Profile;
+use crate::group_profiles::Profile;
 use areograph_base::{altimetry::NO_ATTITUDE, footprints::Footprints, frames::BodyFixed};
 use areograph_config::MolaSurfaceConfig;
 use areograph_geom::{
@@ -18,16 +18,16 @@ use areograph_geom::{
 /// Shots of the profiles that belong to each other, each once, in their order along the profiles.
 #[derive(Debug, Clone)]
 pub struct MolaShots {
-    pub(super) shots: Vec<SurfaceShot>,
+    pub(crate) shots: Vec<SurfaceShot>,
     /// Standard deviation of the radial error that the shots of a profile share, from crossovers, metres.
-    pub(super) profile_sigma_m: f64,
+    pub(crate) profile_sigma_m: f64,
 }
 
 /// The profiles of a site against each other.
 #[derive(Debug, Clone)]
-pub(super) struct CrossedProfiles {
-    pub(super) crossovers: Vec<Crossover>,
-    pub(super) net: ProfileNet,
+pub(crate) struct CrossedProfiles {
+    pub(crate) crossovers: Vec<Crossover>,
+    pub(crate) net: ProfileNet,
 }
 
 impl MolaShots {
@@ -70,7 +70,7 @@ impl MolaShots {
     }
 
     /// These shots, with the crossovers.
-    pub(super) fn crossed(
+    pub(crate) fn crossed(
         footprints: &Footprints<BodyFixed>,
         profiles: &[Profile],
         options: &SurfaceOptions,
@@ -113,7 +113,7 @@ impl MolaShots {
     }
 
     /// `options` with the radial error of profiles from crossovers.
-    pub(super) fn options(&self, options: &SurfaceOptions) -> SurfaceOptions {
+    pub(crate) fn options(&self, options: &SurfaceOptions) -> SurfaceOptions {
         SurfaceOptions {
             profile_sigma_m: self.profile_sigma_m,
             ..*options

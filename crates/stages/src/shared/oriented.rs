@@ -2,7 +2,8 @@
 
 use nalgebra::{Vector2, Vector3};
 
-use super::{fit_sensor_model::SensorModel, orientation::Orientation, tag_times::ImageTimes};
+use super::orientation::Orientation;
+use crate::{fit_sensor_model::SensorModel, tag_times::ImageTimes};
 use areograph_base::error::{Cause, Result};
 use areograph_geom::{
     oriented_camera::OrientedCamera,

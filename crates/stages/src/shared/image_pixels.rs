@@ -4,7 +4,8 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
-use super::{site_image::SiteImage, tag_times::ImageTimes};
+use super::site_image::SiteImage;
+use crate::tag_times::ImageTimes;
 use areograph_base::{
     error::{Cause, Locate as _, Result},
     instruments::Instrument,

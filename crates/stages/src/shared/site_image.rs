@@ -1,8 +1,8 @@
 //! An image of the site with the outputs of its stages: the input of the stages after the registration.
 
-use super::{
-    fit_sensor_model::SensorModel, orientation::Orientation, oriented::OrientedImage,
-    register::ImageRegistration, tag_times::ImageTimes,
+use super::{orientation::Orientation, oriented::OrientedImage};
+use crate::{
+    fit_sensor_model::SensorModel, register::ImageRegistration, tag_times::ImageTimes,
 };
 use areograph_base::error::Result;
 use areograph_store::{

@@ -8,13 +8,13 @@ mod tables;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-pub(super) use light_time::RayOrigin;
+pub(crate) use light_time::RayOrigin;
 pub use light_time::{LightTimeEffect, OtherConvention};
-pub(super) use reader::CameraReader;
-pub(super) use tables::{Camera, Nodes};
+pub(crate) use reader::CameraReader;
+pub(crate) use tables::{Camera, Nodes};
 pub use tables::{CameraTables, InterpolationCheck};
 
-use super::tag_times::ImageTimes;
+use crate::tag_times::ImageTimes;
 use areograph_base::{
     body::{Body, BodyModel},
     error::Result,
@@ -160,7 +160,7 @@ impl OrientationSample {
     }
 
     /// Samples with the camera that `camera` gives for their epochs.
-    pub(super) fn at_epochs(
+    pub(crate) fn at_epochs(
         image: &ImageTimes,
         epochs: &[Et],
         camera: impl Fn(Et) -> Result<Camera>,
@@ -180,7 +180,7 @@ impl GroundPoint {
     }
 
     /// Outline of the delivered lines and samples, seen by the camera that `camera` gives for an instant.
-    pub(super) fn outline(
+    pub(crate) fn outline(
         image: &ImageTimes,
         camera: impl Fn(Et) -> Result<Camera>,
     ) -> Result<Option<Vec<Self>>> {

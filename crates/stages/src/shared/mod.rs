@@ -1,0 +1,14 @@
+//! Modules that serve several stages: images with their orientation and pixels, and the ground that they show.
+
+pub mod camera_lines;
+pub(crate) mod ground;
+pub mod image_pixels;
+pub(crate) mod image_view;
+#[cfg(test)]
+pub(crate) mod invented_pair;
+pub mod line_camera;
+pub mod mola_surface;
+pub mod orientation;
+pub mod oriented;
+pub(crate) mod shot_heights;
+pub mod site_image;
