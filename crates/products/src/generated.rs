@@ -3,14 +3,19 @@
 use std::fmt::Write as _;
 
 use super::{
-    archive::{ARCHIVE_PRODUCTS, SHOTS},
-    calibration::{CALIBRATION_PRODUCTS, CAMERA_SUPPORT},
-    laser_match::{CONTROL, MATCH_PRODUCTS},
-    net::NET_PRODUCTS,
-    product::{Content, Declaration},
+    archive, calibration, laser_match, net,
+    product::{Content, Declaration, Group},
     table::{Kind, Meaning},
 };
 use areograph_base::{schema::DocumentSchema, terms::Terms};
+
+/// The flows other than the flow of sites, each with its products.
+const GROUPS: [fn() -> Group; 4] = [
+    net::group,
+    calibration::group,
+    laser_match::group,
+    archive::group,
+];
 
 /// JSON Schemas of the documents, each once; `of_sites` are all products of sites.
 #[must_use]
@@ -28,16 +33,10 @@ pub fn schemas(of_sites: &[&'static Declaration]) -> Vec<DocumentSchema> {
 }
 
 /// The content declarations of all files.
-fn contents(of_sites: &[&'static Declaration]) -> impl Iterator<Item = &'static Content> {
-    let of_nets = NET_PRODUCTS.iter().map(|product| &product.content);
-    let of_archives = ARCHIVE_PRODUCTS.iter().map(|product| &product.content);
-    let of_calibrations = CALIBRATION_PRODUCTS.iter().map(|product| &product.content);
-    let of_matches = MATCH_PRODUCTS.iter().map(|product| &product.content);
-    let of_sites = of_sites.iter().map(|product| &product.content);
-    let all = of_sites.chain(of_nets).chain(of_archives);
-    all.chain(of_calibrations)
-        .chain(of_matches)
-        .chain([&SHOTS.content])
+fn contents(of_sites: &[&'static Declaration]) -> impl Iterator<Item = Content> {
+    let of_groups = GROUPS.iter().flat_map(|group| group().products);
+    let of_sites = of_sites.iter().map(|product| product.content);
+    of_sites.chain(of_groups.map(|product| product.content))
 }
 
 /// `docs/products.md`: every product, and the columns of every table.
@@ -66,68 +65,36 @@ pub fn documentation(of_sites: &[&'static Declaration]) -> String {
     for product in of_sites {
         text += &columns_of(product, "");
     }
-    text += "\n## Nets of rectified pictures\n\n\
-        Products of `areograph triangulate`, in the folder of the net; `manifest.json` is written last here as well. \
-        `net:` precedes \
-        their names below.\n\n\
-        | file | what it is | for | rows | schema |\n|---|---|---|---|---|\n";
-    for product in NET_PRODUCTS {
-        text += &line_of(product);
+    for group in GROUPS {
+        text += &group_of(&group());
     }
-    // The CSV files have the columns of the Parquet files.
-    for product in NET_PRODUCTS
-        .iter()
-        .filter(|product| product.path.contains(".parquet"))
-    {
-        text += &columns_of(product, "net: ");
-    }
-    text += "\n## Calibrations of the lines of a camera\n\n\
-        Products of `areograph calibrate`, in the folder of the calibration; `manifest.json` is written last here as \
-        well. \
-        `calibration:` precedes their names below, `<camera>` stands for a line of the camera.\n\n\
-        | file | what it is | for | rows | schema |\n|---|---|---|---|---|\n";
-    text += &line_of(&CAMERA_SUPPORT);
-    for product in CALIBRATION_PRODUCTS {
-        text += &line_of(product);
-    }
-    for product in CALIBRATION_PRODUCTS
-        .iter()
-        .filter(|product| product.path.contains(".parquet"))
-    {
-        text += &columns_of(product, "calibration: ");
-    }
-    text += "\n## Laser control points from terrain models\n\n\
-        Products of `areograph pedr match`, in the folder `--out`; `manifest.json` is written last here as well. \
-        `match:` precedes \
-        their names below.\n\n\
-        | file | what it is | for | rows | schema |\n|---|---|---|---|---|\n";
-    text += &line_of(&CONTROL);
-    for product in MATCH_PRODUCTS {
-        text += &line_of(product);
-    }
-    text += &columns_of(&CONTROL, "match: ");
-    for product in MATCH_PRODUCTS
-        .iter()
-        .filter(|product| product.path.contains(".parquet"))
-    {
-        text += &columns_of(product, "match: ");
-    }
-    text += "\n## Archives of PEDR files\n\n\
-        Products of `areograph pedr qa`, in the folder `--out`; `manifest.json` is written last here as well. \
-        `archive:` precedes \
-        their names below.\n\n\
-        | file | what it is | for | rows | schema |\n|---|---|---|---|---|\n";
-    text += &line_of(&SHOTS);
-    for product in ARCHIVE_PRODUCTS {
-        text += &line_of(product);
-    }
-    text += &columns_of(&SHOTS, "archive: ");
-    for product in ARCHIVE_PRODUCTS
-        .iter()
-        .filter(|product| product.path.contains(".parquet"))
-    {
-        text += &columns_of(product, "archive: ");
-    }
+    text
+}
+
+/// Products of a flow other than the flow of sites. CSV files have the columns of the Parquet files.
+fn group_of(group: &Group) -> String {
+    let Group {
+        heading,
+        source,
+        prefix,
+        placeholders,
+        products,
+    } = group;
+    let mut text = format!(
+        "\n## {heading}\n\nProducts of {source}; `manifest.json` is written last here as well. `{prefix}:` precedes \
+        their names below{placeholders}.\n\n\
+        | file | what it is | for | rows | schema |\n|---|---|---|---|---|\n"
+    );
+    text.extend(products.iter().map(line_of));
+    let of_its_own = |product: &&Declaration<()>| {
+        let csv = product.path.strip_suffix(".csv");
+        let parquet = csv.map(|stem| format!("{stem}.parquet"));
+        !products
+            .iter()
+            .any(|of| Some(of.path) == parquet.as_deref())
+    };
+    let tables = products.iter().filter(of_its_own);
+    text.extend(tables.map(|product| columns_of(product, &format!("{prefix}: "))));
     text
 }
 

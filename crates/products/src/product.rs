@@ -43,6 +43,7 @@ pub(super) fn write_each<W>(
 
 /// A product, declared once: the files, the STAC item, `exchange/README.txt` and `docs/products.md` follow. `W` is how
 /// it is written: for a site by [`Write`].
+#[derive(Clone, Copy)]
 pub struct Declaration<W = Write> {
     /// Path below the site's folder; `<image>` stands for an image's identifier.
     pub path: &'static str,
@@ -60,6 +61,55 @@ pub struct Declaration<W = Write> {
     pub write: W,
     /// Instructions for reading it in other programs.
     pub uses: &'static [Use],
+}
+
+impl<W> Declaration<W> {
+    /// The declaration without its writer.
+    const fn described(&self) -> Declaration<()> {
+        Declaration {
+            path: self.path,
+            what: self.what,
+            readers: self.readers,
+            rows: self.rows,
+            role: self.role,
+            content: self.content,
+            write: (),
+            uses: self.uses,
+        }
+    }
+
+    /// The report of a flow, written by `write`.
+    pub(super) const fn report(what: &'static str, write: W) -> Self {
+        Self {
+            path: "report/index.html",
+            what,
+            readers: "people",
+            rows: "",
+            role: Role::Overview,
+            content: Content::Foreign,
+            write,
+            uses: &[],
+        }
+    }
+}
+
+/// Products of a flow other than the flow of sites.
+pub(super) struct Group {
+    /// Heading of the group in the documentation.
+    pub(super) heading: &'static str,
+    /// Command and folder.
+    pub(super) source: &'static str,
+    /// Precedes the paths of its tables in headings.
+    pub(super) prefix: &'static str,
+    /// Explanation of placeholders in paths; empty without any.
+    pub(super) placeholders: &'static str,
+    /// The products, in the order of the documentation.
+    pub(super) products: Vec<Declaration<()>>,
+}
+
+/// Declarations without their writers.
+pub(super) fn described<W>(declarations: &[&Declaration<W>]) -> Vec<Declaration<()>> {
+    declarations.iter().map(|of| of.described()).collect()
 }
 
 /// Placeholder of an image in paths and commands.
@@ -87,6 +137,7 @@ impl Role {
 }
 
 /// Description of the structure of a file.
+#[derive(Clone, Copy)]
 pub enum Content {
     /// A table with these columns.
     Table(fn() -> Vec<Meaning>),

@@ -8,7 +8,7 @@ use std::path::Path;
 
 use super::{
     files::write_text,
-    product::{Content, Declaration, Product, Role, write_each},
+    product::{Declaration, Group, Product, described, write_each},
 };
 use areograph_base::error::Result;
 use areograph_stages::{
@@ -46,26 +46,28 @@ pub struct WorstProfile<'a> {
 pub(super) type WriteArchive = fn(&Path, &ArchiveProducts) -> Result<u64>;
 
 /// The products of an archive, in the order in which they are written; shots of the worst profiles come before.
-pub(super) static ARCHIVE_PRODUCTS: &[&Declaration<WriteArchive>] = &[
+static PRODUCTS: &[&Declaration<WriteArchive>] = &[
     &profiles::TABLE,
     &profiles::CSV,
     &document::DOCUMENT,
     &REPORT,
 ];
 
-static REPORT: Declaration<WriteArchive> = Declaration {
-    path: "report/index.html",
-    what: "the page of the archive",
-    readers: "people",
-    rows: "",
-    role: Role::Overview,
-    content: Content::Foreign,
-    write: |path, of| write_text(path, of.page).map(|()| 0),
-    uses: &[],
-};
+static REPORT: Declaration<WriteArchive> =
+    Declaration::report("the page of the archive", |path, of| {
+        write_text(path, of.page).map(|()| 0)
+    });
 
-/// Declaration of the shots of a profile.
-pub(super) use shots::SHOTS;
+/// The products in the documentation.
+pub(super) fn group() -> Group {
+    Group {
+        heading: "Archives of PEDR files",
+        source: "`areograph pedr qa`, in the folder `--out`",
+        prefix: "archive",
+        placeholders: "",
+        products: [described(&[&shots::SHOTS]), described(PRODUCTS)].concat(),
+    }
+}
 
 /// Writes every product of an archive except shots below `directory`, and reads each of them back.
 ///
@@ -73,7 +75,5 @@ pub(super) use shots::SHOTS;
 /// [`Kind::Io`](areograph_base::error::Kind::Io) for errors of the disk; [`Kind::Bug`](areograph_base::error::Kind::Bug) for numbers that
 /// are not finite and files that read back differently.
 pub fn write_archive_products(directory: &Path, archive: &ArchiveProducts) -> Result<Vec<Product>> {
-    write_each(directory, ARCHIVE_PRODUCTS, |write, path| {
-        write(path, archive)
-    })
+    write_each(directory, PRODUCTS, |write, path| write(path, archive))
 }

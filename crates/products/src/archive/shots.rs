@@ -20,7 +20,7 @@ const PROFILE: &str = "<profile>";
 /// Writer of the shots of a profile; returns their number of rows.
 type WriteShots = fn(&Path, &ArchiveProfile, &[CheckedShot]) -> Result<u64>;
 
-pub(crate) static SHOTS: Declaration<WriteShots> = Declaration {
+pub(super) static SHOTS: Declaration<WriteShots> = Declaration {
     path: "shots/<profile>.parquet",
     what: "every checked shot of a profile with its residuals; one file for each of the worst profiles",
     readers: "scripts",

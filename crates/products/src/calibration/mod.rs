@@ -9,7 +9,7 @@ use std::path::Path;
 use super::{
     files::write_text,
     parquet,
-    product::{Content, Declaration, Product, Role, write_each},
+    product::{Content, Declaration, Group, Product, Role, described, write_each},
     table::Table,
     text_table,
 };
@@ -35,7 +35,7 @@ pub struct CalibrationProducts<'a> {
 pub(super) type WriteCalibration = fn(&Path, &CalibrationProducts) -> Result<u64>;
 
 /// The products of a calibration, in the order in which they are written; products of cameras come first.
-pub(super) static CALIBRATION_PRODUCTS: &[&Declaration<WriteCalibration>] = &[
+static PRODUCTS: &[&Declaration<WriteCalibration>] = &[
     &points::TABLE,
     &points::CSV,
     &images::TABLE,
@@ -48,7 +48,7 @@ pub(super) static CALIBRATION_PRODUCTS: &[&Declaration<WriteCalibration>] = &[
 pub(super) type WriteCamera = fn(&Path, &CameraResult) -> Result<u64>;
 
 /// Support data of a camera.
-pub(super) static CAMERA_SUPPORT: Declaration<WriteCamera> = Declaration {
+static CAMERA_SUPPORT: Declaration<WriteCamera> = Declaration {
     path: "cameras/<camera>/isd.json",
     what: "support data with the calibrated camera and orbit, for `[[images]] isd` and other readers of ISDs",
     readers: "areograph, usgscsm",
@@ -59,16 +59,21 @@ pub(super) static CAMERA_SUPPORT: Declaration<WriteCamera> = Declaration {
     uses: &[],
 };
 
-static REPORT: Declaration<WriteCalibration> = Declaration {
-    path: "report/index.html",
-    what: "the report of the calibration",
-    readers: "people",
-    rows: "",
-    role: Role::Overview,
-    content: Content::Foreign,
-    write: |path, of| write_text(path, of.page).map(|()| 0),
-    uses: &[],
-};
+static REPORT: Declaration<WriteCalibration> =
+    Declaration::report("the report of the calibration", |path, of| {
+        write_text(path, of.page).map(|()| 0)
+    });
+
+/// The products in the documentation.
+pub(super) fn group() -> Group {
+    Group {
+        heading: "Calibrations of the lines of a camera",
+        source: "`areograph calibrate`, in the folder of the calibration",
+        prefix: "calibration",
+        placeholders: ", `<camera>` stands for a line of the camera",
+        products: [described(&[&CAMERA_SUPPORT]), described(PRODUCTS)].concat(),
+    }
+}
 
 /// Writes every product of a calibration below `directory`, and reads each of them back.
 ///
@@ -89,11 +94,9 @@ pub fn write_calibration_products(
             rows,
         });
     }
-    products.extend(write_each(
-        directory,
-        CALIBRATION_PRODUCTS,
-        |write, path| write(path, of),
-    )?);
+    products.extend(write_each(directory, PRODUCTS, |write, path| {
+        write(path, of)
+    })?);
     Ok(products)
 }
 

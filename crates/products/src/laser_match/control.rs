@@ -10,7 +10,7 @@ use crate::{
 use areograph_base::units::wrap_two_pi;
 use areograph_stages::match_laser::{LaserMatch, MatchedPoint};
 
-pub(crate) static CONTROL: Declaration<WriteMatch> = Declaration {
+pub(super) static CONTROL: Declaration<WriteMatch> = Declaration {
     path: "control.csv",
     what: "the control points in the images given with `--isd`, for `[control] files` of a calibration",
     readers: "areograph calibrate",

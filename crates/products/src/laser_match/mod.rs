@@ -10,7 +10,7 @@ use std::path::Path;
 use super::{
     files::write_text,
     parquet,
-    product::{Content, Declaration, Product, Role, write_each},
+    product::{Declaration, Group, Product, described, write_each},
     table::Table,
 };
 use areograph_base::error::Result;
@@ -29,7 +29,7 @@ pub struct MatchProducts<'a> {
 pub(super) type WriteMatch = fn(&Path, &MatchProducts) -> Result<u64>;
 
 /// The products of a match, in the order in which they are written.
-pub(super) static MATCH_PRODUCTS: &[&Declaration<WriteMatch>] = &[
+static PRODUCTS: &[&Declaration<WriteMatch>] = &[
     &units::TABLE,
     &units::CSV,
     &points::TABLE,
@@ -37,19 +37,21 @@ pub(super) static MATCH_PRODUCTS: &[&Declaration<WriteMatch>] = &[
     &REPORT,
 ];
 
-/// Laser points in images, if there are images.
-pub(super) use control::CONTROL;
+static REPORT: Declaration<WriteMatch> =
+    Declaration::report("the report of the match", |path, of| {
+        write_text(path, of.page).map(|()| 0)
+    });
 
-static REPORT: Declaration<WriteMatch> = Declaration {
-    path: "report/index.html",
-    what: "the report of the match",
-    readers: "people",
-    rows: "",
-    role: Role::Overview,
-    content: Content::Foreign,
-    write: |path, of| write_text(path, of.page).map(|()| 0),
-    uses: &[],
-};
+/// The products in the documentation.
+pub(super) fn group() -> Group {
+    Group {
+        heading: "Laser control points from terrain models",
+        source: "`areograph pedr match`, in the folder `--out`",
+        prefix: "match",
+        placeholders: "",
+        products: [described(&[&control::CONTROL]), described(PRODUCTS)].concat(),
+    }
+}
 
 /// Writes every product of a match below `directory`, and reads each of them back.
 ///
@@ -58,9 +60,9 @@ static REPORT: Declaration<WriteMatch> = Declaration {
 /// are not finite and files that read back differently.
 pub fn write_match_products(directory: &Path, of: &MatchProducts) -> Result<Vec<Product>> {
     let write = |write: &WriteMatch, path: &Path| write(path, of);
-    let mut products = write_each(directory, MATCH_PRODUCTS, write)?;
+    let mut products = write_each(directory, PRODUCTS, write)?;
     if !of.result.images.is_empty() {
-        products.extend(write_each(directory, &[&CONTROL], write)?);
+        products.extend(write_each(directory, &[&control::CONTROL], write)?);
     }
     Ok(products)
 }

@@ -14,7 +14,7 @@ use serde::Serialize;
 use super::{
     files::{write_json, write_text},
     parquet,
-    product::{Content, Declaration, Product, Role, write_each},
+    product::{Content, Declaration, Group, Product, Role, described, write_each},
     table::{Meaning, Table},
     text_table,
 };
@@ -37,7 +37,7 @@ pub struct NetProducts<'a> {
 pub(super) type WriteNet = fn(&Path, &NetProducts) -> Result<u64>;
 
 /// The products of a net, in the order in which they are written.
-pub(super) static NET_PRODUCTS: &[&Declaration<WriteNet>] = &[
+static PRODUCTS: &[&Declaration<WriteNet>] = &[
     &points::TABLE,
     &points::CSV,
     &points::GEOJSON,
@@ -53,16 +53,20 @@ pub(super) static NET_PRODUCTS: &[&Declaration<WriteNet>] = &[
     &REPORT,
 ];
 
-static REPORT: Declaration<WriteNet> = Declaration {
-    path: "report/index.html",
-    what: "the report of the net",
-    readers: "people",
-    rows: "",
-    role: Role::Overview,
-    content: Content::Foreign,
-    write: |path, of| write_text(path, of.page).map(|()| 0),
-    uses: &[],
-};
+static REPORT: Declaration<WriteNet> = Declaration::report("the report of the net", |path, of| {
+    write_text(path, of.page).map(|()| 0)
+});
+
+/// The products in the documentation.
+pub(super) fn group() -> Group {
+    Group {
+        heading: "Nets of rectified pictures",
+        source: "`areograph triangulate`, in the folder of the net",
+        prefix: "net",
+        placeholders: "",
+        products: described(PRODUCTS),
+    }
+}
 
 static COLUMNS: Declaration<WriteNet> = Declaration {
     path: "columns.json",
@@ -81,7 +85,7 @@ static COLUMNS: Declaration<WriteNet> = Declaration {
 /// [`Kind::Io`](areograph_base::error::Kind::Io) for errors of the disk; [`Kind::Bug`](areograph_base::error::Kind::Bug) for numbers that
 /// are not finite and files that read back differently.
 pub fn write_net_products(directory: &Path, net: &NetProducts) -> Result<Vec<Product>> {
-    write_each(directory, NET_PRODUCTS, |write, path| write(path, net))
+    write_each(directory, PRODUCTS, |write, path| write(path, net))
 }
 
 /// Writes a table as Parquet with its metadata.
@@ -128,7 +132,7 @@ struct ColumnOfTable {
 
 impl ColumnsDocument {
     fn new() -> Self {
-        let tables = NET_PRODUCTS
+        let tables = PRODUCTS
             .iter()
             .filter(|product| product.media_type() == Some("text/csv"));
         let tables = tables.filter_map(|product| match product.content {

@@ -1,9 +1,7 @@
 //! An image of the site with the outputs of its stages: the input of the stages after the registration.
 
 use super::{orientation::Orientation, oriented::OrientedImage};
-use crate::{
-    fit_sensor_model::SensorModel, register::ImageRegistration, tag_times::ImageTimes,
-};
+use crate::{fit_sensor_model::SensorModel, register::ImageRegistration, tag_times::ImageTimes};
 use areograph_base::error::Result;
 use areograph_store::{
     book::Book,
