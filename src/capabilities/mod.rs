@@ -106,6 +106,14 @@ mod tests {
     use super::*;
 
     #[test]
+    fn downloads_of_the_page_are_declared() {
+        for name in report::DOWNLOADS {
+            let is_it = |path: &str| path == name || path.ends_with(&format!("<image>/{name}"));
+            assert!(declarations().iter().any(|of| is_it(of.path)), "{name}");
+        }
+    }
+
+    #[test]
     fn every_path_and_anchor_is_declared_once() {
         let paths: BTreeSet<&str> = declarations().iter().map(|of| of.path).collect();
         assert_eq!(paths.len(), declarations().len());

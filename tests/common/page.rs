@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 /// What a person sees first.
 pub(crate) fn lead(page: &str) -> &str {
-    page.split("<nav").next().unwrap()
+    page.split("<section").next().unwrap()
 }
 
 /// The section called `id`, as HTML.

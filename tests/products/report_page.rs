@@ -6,7 +6,10 @@
     reason = "helpers of tests may fail loudly and write as they like"
 )]
 
-use crate::common::products_site as fixture;
+use crate::common::{
+    page::{lead, section},
+    products_site as fixture,
+};
 
 use std::{collections::BTreeSet, fs, path::Path};
 
@@ -35,14 +38,38 @@ fn a_failed_range_check_is_said_in_the_first_lines() {
     site.ranges.profiles[0].range_minus_distance_m.mean = 11.0;
     site.ranges.profiles[0].mean_without_outliers_m = 11.0;
     let page = page("small", &site, true);
-    let lead = page.split("<nav").next().unwrap();
+    let lead = lead(&page);
     assert!(lead.contains("class=\"verdict invalid\""));
     assert!(lead.contains("<strong>Invalid, for one reason:</strong>"));
     assert!(lead.contains("<li>profile antimeridian/9019: mean of range − distance 11.000 m"));
     assert!(lead.contains("skipped records: ap19019l.b record 4"));
     assert!(page.contains("beyond the limit"));
-    // The checks stand in the lead too, the worst first, each with a link to what tells more.
-    let checks = lead.split("<caption>Checks</caption>").nth(1).unwrap();
+    // The checks are in the lead too, the worst first, each with a link to its section; those that pass are folded.
+    let [_, checks] = lead
+        .splitn(2, "<caption>Checks</caption>")
+        .collect::<Vec<_>>()[..]
+    else {
+        panic!("no checks in {lead}");
+    };
+    let (shown, folded) = checks.split_once("other checks pass</summary>").unwrap();
+    assert!(!shown.contains("outcome valid") && folded.contains("outcome valid"));
+    // The section of the check that fails is unfolded, and others are not.
+    let of_section = |id| section(&page, id).split("</summary>").next().unwrap();
+    let failed = of_section("range-check");
+    assert!(
+        failed.contains("<details class=\"more whole\" open>"),
+        "{failed}"
+    );
+    assert!(
+        failed.contains("checks fail") || failed.contains("checks fails"),
+        "{failed}"
+    );
+    let passed = of_section("exterior-orientation");
+    assert!(
+        passed.contains("<details class=\"more whole\"><summary>"),
+        "{passed}"
+    );
+    assert!(passed.contains(" pass"), "{passed}");
     let outcomes: Vec<&str> = between(checks, "<span class=\"outcome ", '"').collect();
     assert!(outcomes.len() > 8, "{outcomes:?}");
     let order = ["invalid", "remarks", "valid"];

@@ -1,7 +1,7 @@
 //! The table of the first screen: every limit of the site with the value that uses most of it, the worst first.
 
 use super::{
-    html::{Cell, Column, Markup, Table, Tone, html, link, list},
+    html::{Cell, Column, Markup, Table, Tone, counted, folded, html, link, list},
     numbers::{number, signed, whole},
     section::Section,
 };
@@ -9,10 +9,25 @@ use areograph_base::verdict::NOT_TESTED;
 use areograph_products::SiteProducts;
 use areograph_stages::judge::{Check, CheckOutcome};
 
-/// The table of the checks of a site, with links to the `sections` that have details.
-pub(super) fn table(site: &SiteProducts, sections: &[&Section]) -> Markup {
+/// The checks of a site, with links to the `sections` that have details; checks that pass are folded to a line.
+pub(super) fn of_site(site: &SiteProducts, sections: &[&Section]) -> Markup {
+    let checks = site.verdict.checks.iter().enumerate();
+    let (passed, others): (Vec<_>, Vec<_>) =
+        checks.partition(|(_, check)| check.outcome == CheckOutcome::Pass);
+    let title = match others.len() {
+        0 => format!("All {} pass", counted(passed.len(), "check")),
+        _ => format!("{} pass", counted(passed.len(), "other check")),
+    };
+    html! {
+        @if !others.is_empty() { (table(site, sections, &others)) }
+        @if !passed.is_empty() { (folded(&title, &table(site, sections, &passed))) }
+    }
+}
+
+/// The table of some checks of a site by their index.
+fn table(site: &SiteProducts, sections: &[&Section], checks: &[(usize, &Check)]) -> Markup {
     let mut table = empty();
-    for (index, check) in site.verdict.checks.iter().enumerate() {
+    for (index, check) in checks {
         let mut all = sections.iter();
         let more = all.find(|section| section.checks.contains(&check.kind));
         let more = more.filter(|section| (section.appears)(site));
@@ -20,7 +35,7 @@ pub(super) fn table(site: &SiteProducts, sections: &[&Section]) -> Markup {
             || html! { (check.words()) },
             |section| link(&format!("#{}", section.anchor), &check.words()),
         );
-        row(&mut table, check, &what, &place(index));
+        row(&mut table, check, &what, &place(*index));
     }
     table.finish()
 }
@@ -65,6 +80,27 @@ fn row(table: &mut Table, check: &Check, what: &Markup, place: &str) {
     );
 }
 
+/// The number of checks with the worst outcome of `checks`, and whether all pass; empty without checks.
+pub(super) fn outcomes<'a>(checks: impl Iterator<Item = &'a Check>) -> (Markup, bool) {
+    let all: Vec<CheckOutcome> = checks.map(|check| check.outcome).collect();
+    let of = |outcome| all.iter().filter(|of| **of == outcome).count();
+    let [failed, warnings] = [CheckOutcome::Fail, CheckOutcome::Warning].map(of);
+    let text = match (failed, warnings, all.len()) {
+        (_, _, 0) => return (Markup::default(), true),
+        (0, 0, 1) => "1 check passes".to_owned(),
+        (0, 0, count) => format!("{count} checks pass"),
+        (0, warnings, _) => counted(warnings, "warning"),
+        (1, _, count) => format!("1 of {count} checks fails"),
+        (failed, _, count) => format!("{failed} of {count} checks fail"),
+    };
+    let outcome = match (failed, warnings) {
+        (0, 0) => CheckOutcome::Pass,
+        (0, _) => CheckOutcome::Warning,
+        _ => CheckOutcome::Fail,
+    };
+    (marked(outcome, &text), outcome == CheckOutcome::Pass)
+}
+
 /// Place of a check in the products.
 pub(super) fn place(index: usize) -> String {
     format!("manifest.json#/verdict/checks/{index}")
@@ -81,12 +117,22 @@ const fn value_place(check: &Check) -> &'static str {
 
 /// Mark and word of an outcome.
 fn result(outcome: CheckOutcome) -> Cell {
-    let (tone, mark, word) = match outcome {
-        CheckOutcome::Fail => (Tone::Bad, "✗", "fail"),
-        CheckOutcome::Warning => (Tone::Remarks, "!", "warning"),
-        CheckOutcome::Pass => (Tone::Good, "✓", "pass"),
+    let word = match outcome {
+        CheckOutcome::Fail => "fail",
+        CheckOutcome::Warning => "warning",
+        CheckOutcome::Pass => "pass",
     };
-    html! { span.outcome.(tone.class()) { b aria-hidden="true" { (mark) } " " (word) } }.into()
+    marked(outcome, word).into()
+}
+
+/// Words in the colour of an outcome, behind its mark.
+fn marked(outcome: CheckOutcome, words: &str) -> Markup {
+    let (tone, mark) = match outcome {
+        CheckOutcome::Fail => (Tone::Bad, "✗"),
+        CheckOutcome::Warning => (Tone::Remarks, "!"),
+        CheckOutcome::Pass => (Tone::Good, "✓"),
+    };
+    html! { span.outcome.(tone.class()) { b aria-hidden="true" { (mark) } " " (words) } }
 }
 
 /// The value found, with its unit; a dash if it is not a number.
@@ -127,9 +173,8 @@ pub(super) fn limit(check: &Check) -> String {
 
 /// Errors that no datum can show.
 pub(super) fn untested(phrases: &[String]) -> Markup {
-    html! {
-        @if !phrases.is_empty() { p.about { b { (NOT_TESTED) } } (list(phrases)) }
-    }
+    let title = format!("{NOT_TESTED} {}", counted(phrases.len(), "kind of error"));
+    html! { (folded(&title.replace("kind of errors", "kinds of error"), &list(phrases))) }
 }
 
 #[cfg(test)]

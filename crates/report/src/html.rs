@@ -50,6 +50,16 @@ pub(super) struct Section {
     anchor: String,
     heading: Cow<'static, str>,
     body: Markup,
+    /// How it is folded, if it is.
+    fold: Option<Fold>,
+}
+
+/// A section that is unfolded on request, and on paper.
+struct Fold {
+    /// Stands beside the heading.
+    note: Markup,
+    /// Whether it is unfolded from the start.
+    is_open: bool,
 }
 
 impl Section {
@@ -64,6 +74,32 @@ impl Section {
             anchor: anchor.to_owned(),
             heading: heading.into(),
             body,
+            fold: None,
+        }
+    }
+
+    /// The section folded under its heading and a note, unless it `is_open`.
+    pub(super) fn folded(mut self, note: Markup, is_open: bool) -> Self {
+        self.fold = Some(Fold { note, is_open });
+        self
+    }
+
+    fn html(&self) -> Markup {
+        let Self {
+            anchor,
+            heading,
+            body,
+            fold,
+        } = self;
+        html! {
+            section id=(anchor) {
+                @match fold {
+                    None => { h2 { (heading) } (body) }
+                    Some(Fold { note, is_open }) => {
+                        details.more.whole open[*is_open] { summary { h2 { (heading) } " " (note) } (body) }
+                    }
+                }
+            }
         }
     }
 }
@@ -86,14 +122,13 @@ pub(super) fn page(title: &str, lead: &Markup, sections: &[Section]) -> String {
                 header { h1 { (title) } }
                 main {
                     (lead)
-                    @if !shown.is_empty() {
+                    // Folded sections are their own list of contents.
+                    @if shown.iter().any(|section| section.fold.is_none()) {
                         nav aria-label="Contents" {
                             ul { @for section in &shown { li { (link(&format!("#{}", section.anchor), &section.heading)) } } }
                         }
                     }
-                    @for Section { anchor, heading, body } in &shown {
-                        "\n" section id=(anchor) { h2 { (heading) } (body) }
-                    }
+                    @for section in &shown { "\n" (section.html()) }
                 }
                 "\n" footer { "Made by areograph " (env!("CARGO_PKG_VERSION")) "." }
             }

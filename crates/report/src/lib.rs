@@ -30,6 +30,7 @@ mod fidelity;
 mod graticule;
 mod heights;
 mod html;
+mod image_strips;
 mod images;
 mod laser_match;
 mod many;
@@ -80,6 +81,7 @@ pub use net::net_page;
 pub use overlays::overlays_page;
 pub use section::Section;
 pub use sites::{Earlier, SiteLine, SiteSummary, sites_page};
+pub use summary::DOWNLOADS;
 pub use terrain_pictures::terrain_pictures;
 
 /// Parts of sections that are declared outside this crate.

@@ -44,9 +44,10 @@ const ROUNDING: f64 = 0.75;
 const TRACK_GAP: f64 = 60.0;
 /// Colour of shots, which the page's style does not change.
 const TRACK: RGBColor = RGBColor(0x1a, 0x1a, 0x1a);
-/// Colours of image outlines and of tie points; the ground has no similar ones.
+/// Colours of image outlines, of tie points and of their ellipses; the ground has no similar ones.
 const IMAGE: usize = 3;
 const TIE: usize = 1;
+const ELLIPSE: usize = 5;
 
 /// The maps after the first, which is in the lead.
 pub(super) const SECTION: Section = Section {
@@ -245,7 +246,7 @@ impl Sheet {
             let ring: Vec<(f64, f64)> = places
                 .map(|place| (place.longitude_rad, place.latitude.0))
                 .collect();
-            self.draw_ring(&ring, COLOURS[TIE].stroke_width(2), area)?;
+            self.draw_ring(&ring, COLOURS[ELLIPSE].stroke_width(2), area)?;
         }
         let frame = [(0, 0), (WIDTH as i32 - 1, self.height() - 1)];
         area.draw(&Rectangle::new(frame, INK.stroke_width(2)))?;

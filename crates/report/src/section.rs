@@ -1,6 +1,9 @@
 //! Declaration of a section of a site's page.
 
-use super::html::{self, Markup};
+use super::{
+    checks,
+    html::{self, Markup},
+};
 use areograph_base::{error::Result, verdict::CheckKind};
 use areograph_products::SiteProducts;
 
@@ -31,10 +34,10 @@ impl Section {
         }
         let terms = site.config.terms();
         let title = terms.fill(self.title);
-        Ok(Some(html::Section::named(
-            self.anchor,
-            title,
-            (self.write)(site)?,
-        )))
+        let checks = site.verdict.checks.iter();
+        let own = checks.filter(|check| self.checks.contains(&check.kind));
+        let (note, all_pass) = checks::outcomes(own);
+        let section = html::Section::named(self.anchor, title, (self.write)(site)?);
+        Ok(Some(section.folded(note, !all_pass)))
     }
 }

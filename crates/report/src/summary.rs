@@ -5,15 +5,15 @@ use std::borrow::Cow;
 use super::{
     checks,
     heights::{WITHHELD_BECAUSE, is_open, place_by},
-    html::{Markup, Tone, counted, folded_unless, html, list, verdict},
-    map,
+    html::{Markup, Tone, counted, folded_unless, html, link, list, verdict},
+    image_strips, map,
     misregistration::{BeforeAfter, by_footprints},
     numbers::{number, signed, whole},
     section::Section,
     source::traced,
 };
 use areograph_base::{error::Result, footprints::AdjustmentModel};
-use areograph_products::SiteProducts;
+use areograph_products::{Listed, SiteProducts};
 use areograph_stages::{
     compare_pairs::PairComparison,
     judge::{Check, CheckKind, NO_BEAM},
@@ -37,9 +37,13 @@ pub(super) fn lead(site: &SiteProducts, sections: &[&Section]) -> Result<Markup>
     let found = html! {
         (verdict(tone, &headline(site), &first_of(reasons)))
         (numbers(site))
-        (checks::untested(&site.verdict.untested))
         div.first {
-            div { (checks::table(site, sections)) }
+            div {
+                (image_strips::figures(site)?)
+                (checks::of_site(site, sections))
+                (checks::untested(&site.verdict.untested))
+                (downloads(site))
+            }
             div { (map::first(site)?) }
         }
         (folded_unless(reasons.is_empty(), &counted(remarks.len(), "remark"), &listed))
@@ -83,6 +87,38 @@ fn about(site: &SiteProducts) -> Markup {
             @if !site.images.is_empty() { (traced(&images, "manifest.json#/counts/images")) (taken) "; " }
             (traced(&footprints, "manifest.json#/counts/footprints"))
             " in " (traced(&profiles, "manifest.json#/counts/profiles")) (shot) "."
+        }
+    }
+}
+
+/// Names of the products that most users take: paths, and file names of products of images.
+pub const DOWNLOADS: [&str; 7] = [
+    "registered_footprints.parquet",
+    "registered_footprints.csv",
+    "exchange/registered_footprints.gpkg",
+    "exchange/site.qgz",
+    "surface.tif",
+    "orthoimage.tif",
+    "adjusted_isd.json",
+];
+
+/// Links to these products.
+fn downloads(site: &SiteProducts) -> Markup {
+    let shown = site.shown_images();
+    let is_offered = |of: &&Listed| match of.image {
+        None => DOWNLOADS.contains(&&*of.path),
+        Some(image) => {
+            let name = of.path.rsplit('/').next().unwrap_or_default();
+            DOWNLOADS.contains(&name) && shown.binary_search(&image).is_ok()
+        }
+    };
+    let offered: Vec<&Listed> = site.listed.iter().filter(is_offered).collect();
+    html! {
+        @if !offered.is_empty() {
+            ul.downloads {
+                @for of in offered { li { (link(&format!("../{}", of.path), &of.path)) } }
+                li { (link("#provenance", &format!("all {}", counted(site.listed.len(), "product")))) }
+            }
         }
     }
 }

@@ -64,7 +64,7 @@ pub(super) fn plot(site: &SiteProducts, geometric: &GeometricProducts) -> Plot {
     ])];
     differences.extend(dots(TieHeight::above_m));
     let panels = vec![
-        Panel::of("height, m", heights),
+        Panel::of("above the ellipsoid, m", heights),
         Panel {
             height: 300,
             y: without_extremes(&differences),

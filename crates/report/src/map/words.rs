@@ -9,7 +9,7 @@ use super::{
         outlines::Outline,
         plots::{Key, label, quoted},
     },
-    IMAGE, MAP_SHOTS, Sheet, TIE,
+    ELLIPSE, IMAGE, MAP_SHOTS, Sheet, TIE,
     relief::Relief,
 };
 use areograph_base::units::RADIANS_PER_DEGREE;
@@ -23,7 +23,11 @@ impl Sheet {
         if !self.ties_rad.is_empty() {
             keys.push(Key::colour("tie points", TIE));
         }
-        keys.extend(self.ellipses.key().map(|words| Key::colour(&words, TIE)));
+        keys.extend(
+            self.ellipses
+                .key()
+                .map(|words| Key::colour(&words, ELLIPSE)),
+        );
         keys
     }
 

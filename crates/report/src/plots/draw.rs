@@ -1,9 +1,10 @@
 //! Plots on paper: panels with their axes, marks, series, arrows and bars.
 
+use base64::{Engine as _, engine::general_purpose::STANDARD};
 use plotters::prelude::*;
 
 use super::{
-    Frame, GRID, INK, LETTERS, MARK, Panel, Plot, Series, Style, WIDTH,
+    Frame, GRID, INK, LETTERS, MARK, Panel, PanelPicture, Plot, Series, Style, WIDTH,
     arrows::draw_arrows,
     canvas::{Canvas, Chart, Drawn, label},
 };
@@ -12,6 +13,8 @@ use super::{
 pub(super) const FOOT: u32 = 96;
 /// Room between panels, for the labels at their corners.
 const GUTTER: u32 = 16;
+/// Margin above and beside a panel.
+const MARGIN: u32 = 14;
 /// Labels of the lowest axis, about.
 const X_LABELS: usize = 6;
 /// Width of the axes at the left side.
@@ -36,14 +39,37 @@ pub(super) fn plot<'a>(plot: &Plot, area: &Canvas<'a>) -> Drawn<'a> {
     Ok(())
 }
 
+/// The pictures of panels as images of the SVG, to which axes and series are added.
+pub(super) fn pictures(plot: &Plot) -> String {
+    let mut images = String::new();
+    let mut top = MARGIN;
+    for panel in plot.drawn() {
+        if let Some(PanelPicture { png, x, y }) = &panel.picture {
+            let across = f64::from(WIDTH - SIDE - MARGIN) / (plot.x.high - plot.x.low);
+            let down = f64::from(panel.height - MARGIN - GUTTER) / (panel.y.high - panel.y.low);
+            images += &format!(
+                "<image x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{:.1}\" preserveAspectRatio=\"none\" \
+                 href=\"data:image/png;base64,{}\"/>\n",
+                f64::from(SIDE) + (x.low - plot.x.low) * across,
+                f64::from(top) + (panel.y.high - y.high) * down,
+                (x.high - x.low) * across,
+                (y.high - y.low) * down,
+                STANDARD.encode(png)
+            );
+        }
+        top += panel.height;
+    }
+    images
+}
+
 fn draw_panel<'a>(plot: &Plot, panel: &Panel, lowest: bool, area: &Canvas<'a>) -> Drawn<'a> {
     let foot = if lowest { FOOT } else { 0 };
     let histograms = plot.drawn().any(|panel| panel.histogram);
     let width = if histograms { WIDTH - BARS } else { WIDTH };
     let (left, right) = area.split_horizontally(width);
     let mut chart = ChartBuilder::on(&left)
-        .margin_top(14)
-        .margin_right(14)
+        .margin_top(MARGIN)
+        .margin_right(MARGIN)
         .margin_bottom(if lowest { 0 } else { GUTTER })
         .x_label_area_size(foot)
         .y_label_area_size(SIDE)
@@ -58,7 +84,11 @@ fn draw_panel<'a>(plot: &Plot, panel: &Panel, lowest: bool, area: &Canvas<'a>) -
         .x_labels(X_LABELS)
         .y_labels(y_labels)
         .max_light_lines(0)
-        .bold_line_style(GRID.stroke_width(2))
+        .bold_line_style(if panel.picture.is_some() {
+            TRANSPARENT.stroke_width(0)
+        } else {
+            GRID.stroke_width(2)
+        })
         .axis_style(INK.stroke_width(2))
         .label_style(("sans-serif", LETTERS).into_font().color(&INK))
         .axis_desc_style(("sans-serif", LETTERS).into_font().color(&INK))
@@ -166,7 +196,7 @@ fn draw_histogram<'a>(panel: &Panel, foot: u32, area: &Canvas<'a>) -> Drawn<'a> 
     let counts = histogram(panel);
     let most = counts.iter().copied().max().unwrap_or(0).max(1);
     let mut chart = ChartBuilder::on(area)
-        .margin_top(14)
+        .margin_top(MARGIN)
         .margin_right(8)
         .margin_bottom(if foot > 0 { 0 } else { GUTTER })
         .x_label_area_size(foot)

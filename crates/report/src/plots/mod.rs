@@ -110,6 +110,16 @@ pub(super) struct Panel {
     pub(super) least: f64,
     /// Whether the points hold logarithms to base 10 of the values; axis and data have the values.
     pub(super) log: bool,
+    /// A picture behind everything else.
+    pub(super) picture: Option<PanelPicture>,
+}
+
+/// A picture in the units of the axes of a panel.
+#[derive(Debug)]
+pub(super) struct PanelPicture {
+    pub(super) png: Vec<u8>,
+    pub(super) x: Extent,
+    pub(super) y: Extent,
 }
 
 impl Panel {
@@ -127,6 +137,7 @@ impl Panel {
             histogram: false,
             least: ROUNDING,
             log: false,
+            picture: None,
         }
     }
 }
@@ -233,7 +244,10 @@ pub(super) fn figure(plot: &Plot) -> Result<Markup> {
         return Ok(html! { p { (plot.title) ": " (plot.description()) } });
     }
     let height = plot.drawn().map(|panel| panel.height).sum::<u32>() + draw::FOOT;
-    let svg = drawn(height, |area| draw::plot(plot, area))?;
+    let mut svg = drawn(height, |area| draw::plot(plot, area))?;
+    if let Some(start) = svg.find('>') {
+        svg.insert_str(start + 1, &draw::pictures(plot));
+    }
     Ok(figure_html(
         &plot.title,
         &svg,
