@@ -12,7 +12,7 @@
 #![allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
-    reason = "pulses are counted, three thousand in the longest pause, and casts of floats saturate"
+    reason = "pulse counts reach three thousand in the longest pause, and casts of floats saturate"
 )]
 
 #[cfg(test)]
@@ -243,7 +243,7 @@ fn spacings<'a>(site: &SiteProducts<'a>) -> Result<Vec<(&'a Profile, &'a Profile
 
 static DOCUMENT: Declaration = Declaration {
     path: "spacing.json",
-    what: "for every profile: spacing of its shots, largest gap, and number of missing shots",
+    what: "shot spacing, largest gap and number of missing shots of every profile",
     readers: "scripts",
     rows: "profiles",
     role: Role::Metadata,
@@ -265,7 +265,7 @@ static DOCUMENT: Declaration = Declaration {
 #[schemars(
     deny_unknown_fields,
     title = "spacing.json",
-    description = "spacing.json of areograph: spacing of the shots of every profile. Metres and seconds; unknown values are omitted."
+    description = "spacing.json of areograph: shot spacing of every profile. Metres and seconds; unknown values are omitted."
 )]
 struct Document<'a> {
     #[schemars(extend("const" = "areograph spacing 1"))]
@@ -279,19 +279,19 @@ struct Document<'a> {
 struct Entry<'a> {
     /// Identifier of the profile.
     profile: &'a str,
-    /// Number of shots; spots of one pulse count once.
+    /// Number of shots; spots of one pulse are counted once.
     shots: u32,
     /// Number of pulses inside the window, between the first and the last shot, that have no shot in the products; omitted
-    /// where the period is not known.
+    /// if the period is not known.
     #[serde(skip_serializing_if = "Option::is_none")]
     missing: Option<u32>,
-    /// Interval between pulses: of MOLA by its specification, of other altimeters estimated from the shots.
+    /// Interval between pulses: from the specification for MOLA, estimated from the shots for other altimeters.
     #[serde(skip_serializing_if = "Option::is_none")]
     period_s: Option<f64>,
     /// Median distance on the ground between shots of consecutive pulses.
     #[serde(skip_serializing_if = "Option::is_none")]
     spacing_m: Option<f64>,
-    /// Largest distance on the ground between consecutive shots of the profile, as far as it is inside the window.
+    /// Largest distance on the ground between consecutive shots of the profile; only the part inside the window counts.
     #[serde(skip_serializing_if = "Option::is_none")]
     gap_m: Option<f64>,
 }
@@ -356,8 +356,9 @@ fn write(site: &SiteProducts) -> Result<Markup> {
         );
     }
     let words = paragraph(
-        "A shot is missing if the products contain none for a pulse inside the window, between the first and the last shot of \
-         the profile: it had no return, or pedr.filter rejected it. Heights in a gap are interpolated between its two edges.",
+        "A shot is missing if the products contain none for a pulse inside the window, between the first and the last shot \
+         of the profile: the pulse had no return, or pedr.filter rejected the shot. Heights in a gap are interpolated \
+         between its two edges.",
     );
     Ok(html! { (words) (folded_unless(is_sparse, "Profiles", &table.finish())) })
 }

@@ -41,7 +41,7 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
     let (task, name) = (Task::Calibration(&calibration), &calibration.calibration);
     single::run(task, name, &arguments.out, &arguments.run, |count| {
         format!(
-            "{} lines, {} ties, {} laser points, {} more withheld, {} left out",
+            "{} lines, {} tie points, {} laser points, {} more withheld, {} rejected",
             count("cameras"),
             count("ties"),
             count("controls"),

@@ -17,7 +17,7 @@ use crate::{config::ShotFormat, error::Result, flow::export_site};
 ///
 /// Example: `areograph export out/gusev_crater gpkg csv --to gis`
 #[derive(Debug, Args)]
-#[allow(clippy::doc_markdown, reason = "help is printed as it is")]
+#[allow(clippy::doc_markdown, reason = "help is printed verbatim")]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
     /// Products of a site.

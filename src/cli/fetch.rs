@@ -38,7 +38,7 @@ use crate::{
 ///   areograph fetch gale.toml --audit
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
-#[allow(clippy::struct_excessive_bools, reason = "switches of a command line")]
+#[allow(clippy::struct_excessive_bools, reason = "command-line switches")]
 pub(super) struct Arguments {
     /// Site files (TOML); their inputs may be missing.
     #[arg(value_name = "SITE.toml")]
@@ -165,7 +165,9 @@ fn verified(filling: &Filling<'_>) -> Result<()> {
         super::output::line(format_args!("{}: {}", one.path.display(), one.problem));
     }
     if damaged.is_empty() {
-        super::output::line(format_args!("files as they were fetched: {files}"));
+        super::output::line(format_args!(
+            "files unchanged since they were fetched: {files}"
+        ));
         return Ok(());
     }
     let damaged = damaged.len();

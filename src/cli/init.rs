@@ -72,7 +72,7 @@ pub(super) struct Arguments {
 #[cause(Configuration)]
 enum Refused {
     #[error("already exists")]
-    #[cause("name another folder, another --site, or remove the file")]
+    #[cause("name a different folder or --site, or remove the file")]
     Exists,
     #[error("missing: {0}")]
     #[cause("give the options of `areograph init --help`, or answer on a terminal")]

@@ -28,7 +28,7 @@ use crate::{
 ///   areograph report products/gusev_crater --page gusev.html
 ///   areograph report diff out.yesterday out --limit-m 5
 #[derive(Debug, Args)]
-#[allow(clippy::doc_markdown, reason = "examples are printed as they are")]
+#[allow(clippy::doc_markdown, reason = "examples are printed verbatim")]
 #[command(
     verbatim_doc_comment,
     args_conflicts_with_subcommands = true,

@@ -25,7 +25,7 @@ pub(super) struct RunArguments {
 
 /// Flags of every run, that of a site too.
 #[derive(Debug, Clone, Args)]
-#[allow(clippy::struct_excessive_bools, reason = "flags of a command line")]
+#[allow(clippy::struct_excessive_bools, reason = "command-line flags")]
 pub(super) struct RunFlags {
     /// Run every stage, even if its stored output is up to date.
     #[arg(long)]

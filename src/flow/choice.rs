@@ -95,7 +95,7 @@ fn choose_kernels(
             chosen: 0,
             entries: Vec::new(),
             notes: vec![format!(
-                "kernel set {first} is used: no position is needed for which the sets could be compared"
+                "kernel set {first} is used: no required position allows a comparison of the sets"
             )],
         });
     }

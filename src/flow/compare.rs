@@ -83,14 +83,14 @@ enum CompareError {
     #[cause(Configuration: "name each set once")]
     Same { first: String, other: String },
     #[error("the kernel sets have no common coverage of the position of {}; {held}", SPACECRAFT.name)]
-    #[cause(Coverage: "see `areograph kernels coverage` for each set, and leave out the set that does not cover this \
+    #[cause(Coverage: "see `areograph kernels coverage` for each set, and omit the set that does not cover this \
         time")]
     NothingInCommon { held: String },
     #[error(
         "the clocks of the kernel sets {first} and {other} differ: {reading} is {apart_s} s later in {other}"
     )]
-    #[cause(Input: "give all sets the same leap-second (.tls) and spacecraft clock (.tsc) kernels: times of images \
-        depend on them")]
+    #[cause(Input: "give all sets the same leap-second (.tls) and spacecraft clock (.tsc) kernels: image times depend on \
+        them")]
     Clocks {
         first: String,
         other: String,

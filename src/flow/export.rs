@@ -30,7 +30,7 @@ enum ExportError {
     AmongProducts,
     /// The file may be another program's.
     #[error("the file exists; nothing was exported")]
-    #[cause(Configuration: "remove it, or give another folder with --to")]
+    #[cause(Configuration: "remove the file, or give another folder with --to")]
     Exists,
 }
 

@@ -37,11 +37,11 @@ pub enum OutError {
     },
     /// Products would be inputs of the next run, or inputs lie among products.
     #[error(
-        "the output folder {} overlaps the input folder {}; expected folders apart from each other",
+        "the output folder {} overlaps the input folder {}; expected separate folders",
         .out.display(), .input.display()
     )]
     #[cause(
-        "name a folder for the products (--out) that neither holds inputs nor lies in a folder of inputs"
+        "name a folder for the products (--out) that neither contains inputs nor lies in an input folder"
     )]
     Overlap {
         /// The folder of all products, or of the site's products.
@@ -53,7 +53,7 @@ pub enum OutError {
     #[error(
         "--out has a path component of {bytes} bytes, {part:.20}…; expected at most {PART_LENGTH_MAX}"
     )]
-    #[cause("name a folder with a shorter path for --out; a relative path counts as it is written")]
+    #[cause("name a folder with a shorter path for --out; a relative path is counted as written")]
     LongPart {
         /// The part.
         part: String,
@@ -62,7 +62,8 @@ pub enum OutError {
     },
     /// A kernel of an adjusted image has a path that CSPICE does not accept.
     #[error(
-        "with --out the path of a product, {}, is {} bytes long while it is written; CSPICE accepts at most {PATH_LENGTH_MAX}",
+        "with this --out, the path of a product, {}, is {} bytes long during writing; CSPICE accepts at most \
+         {PATH_LENGTH_MAX}",
         .product.display(), .product.as_os_str().len()
     )]
     #[cause(like = LongPart)]

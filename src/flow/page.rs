@@ -19,8 +19,8 @@ use crate::{
 
 /// The page differs from the published one, although its content is unchanged.
 #[derive(Debug, thiserror::Error, Cause)]
-#[error("the page made from these products differs from the published one")]
-#[cause(Input: "it was made by another build of this version: run the site again, or write the page elsewhere with \
+#[error("the page from these products differs from the published page")]
+#[cause(Input: "the published page is from another build of this version: run the site again, or write the page elsewhere with \
     --page")]
 struct OtherPage;
 

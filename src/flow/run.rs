@@ -134,7 +134,7 @@ pub fn run_task(task: Task<'_>, options: &RunOptions<'_>) -> Result<RunOutcome> 
     let cache = options.stage_cache(&folder);
     let (mut run, mut driven) = drive(task, &stages, options, &folder, cache);
     if run.cache.has_lost_output() {
-        tracing::warn!("a stored output is damaged or cannot be read: the run begins again");
+        tracing::warn!("a stored output is damaged or cannot be read: the run restarts");
         // Every stored output is read at once, and a damaged one is computed anew.
         let at_once = StageCache::new(&folder.join(CACHE), options.force);
         (run, driven) = drive(task, &stages, options, &folder, at_once);

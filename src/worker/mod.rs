@@ -124,7 +124,7 @@ fn read_task() -> Option<std::result::Result<Task, String>> {
             Ok(task)
         } else {
             Err(format!(
-                "the task is of version {}; expected {PROTOCOL}",
+                "the task has version {}; expected {PROTOCOL}",
                 task.v
             ))
         }

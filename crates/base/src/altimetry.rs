@@ -6,33 +6,33 @@ use serde::{Deserialize, Serialize};
 
 use crate::{body::Datum, season::solar_longitude_rad, time::Et};
 
-/// The clock bias of MOLA: how shot tags become shot times.
+/// Clock bias of MOLA: correction of time tags to shot times.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 pub struct MolaClock {
     /// Size, seconds, not negative.
     #[cfg_attr(feature = "schema", schemars(range(min = 0.0)))]
     pub bias_s: f64,
-    /// Sign of the error of the tags.
+    /// Sign of the time tag error.
     pub sign: TagSign,
-    /// Use of the corrected time.
+    /// Computations that use the corrected shot time.
     pub scope: BiasScope,
     /// Citation that products repeat.
     pub source: String,
 }
 
-/// Sign of the error of a tag.
+/// Sign of the time tag error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum TagSign {
-    /// Tags are late: true time = tag − bias.
+    /// Time tags are late: true time = tag − bias.
     Late,
-    /// Tags are early: true time = tag + bias.
+    /// Time tags are early: true time = tag + bias.
     Early,
 }
 
-/// Use of the corrected shot time.
+/// Computations that use the corrected shot time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(rename_all = "snake_case")]
@@ -43,7 +43,7 @@ pub enum BiasScope {
     Rotation,
     /// Both.
     Both,
-    /// Nothing: tags are used unchanged.
+    /// None: time tags are used unchanged.
     None,
 }
 
@@ -92,15 +92,15 @@ pub enum DatumChoice {
     Stated(Datum),
 }
 
-/// The radius of a shot that every stage takes for the ground.
+/// Radius of a shot that all stages use for the ground.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum GroundRadius {
-    /// Corrected by the crossover residual of its file where the file has one.
+    /// Corrected by the crossover residual, where the file states one.
     #[default]
     Corrected,
-    /// Before that correction: the measured range laid off from the orbit of the file.
+    /// Uncorrected: the measured range laid off from the orbit in the file.
     Raw,
 }
 
@@ -128,7 +128,7 @@ impl GroundRadius {
 /// assumes nadir pointing.
 pub const NO_ATTITUDE: u16 = 2;
 
-/// Shots to keep; a shot must pass every test.
+/// Selection of shots; a shot must meet every criterion.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ShotFilter {
     /// Classification codes (1 ground, 0 cloud or noise).

@@ -106,7 +106,7 @@ static MOON: LazyLock<BodyFile> =
 /// Content of a file under `config/bodies`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-#[allow(dead_code, reason = "sources are for those who read the file")]
+#[allow(dead_code, reason = "sources are for readers of the file")]
 struct BodyFile {
     id: String,
     names: Names,
@@ -147,7 +147,7 @@ pub struct Naif {
 /// Tolerance of rotations of files against the formula.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-#[allow(dead_code, reason = "sources are for those who read the file")]
+#[allow(dead_code, reason = "sources are for readers of the file")]
 struct RotationOfFiles {
     tolerance_rad: f64,
     source: String,
@@ -174,7 +174,7 @@ pub struct MapSphere {
 /// Rotation and shape of one report, with their source.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-#[allow(dead_code, reason = "sources are for those who read the file")]
+#[allow(dead_code, reason = "sources are for readers of the file")]
 struct Report {
     pole_ra_deg: f64,
     pole_ra_deg_per_century: f64,
@@ -288,7 +288,7 @@ impl fmt::Display for Datum {
 impl BodyFile {
     #[expect(
         clippy::panic,
-        reason = "a program built with a bad file of its own; a test reads every report"
+        reason = "an invalid file in the program itself; a test reads every report"
     )]
     fn model(&self, name: &'static str) -> BodyModel {
         let Some(report) = self.report.get(name) else {
@@ -315,7 +315,7 @@ impl BodyFile {
 
 #[expect(
     clippy::panic,
-    reason = "a program built with a bad file of its own; every test on a body reads it"
+    reason = "an invalid file in the program itself; every test with a body reads it"
 )]
 fn of_the_program<T: serde::de::DeserializeOwned>(text: &str) -> T {
     toml::from_str(text).unwrap_or_else(|error| panic!("built with an invalid file: {error}"))

@@ -106,7 +106,7 @@ impl Spacecraft {
 
 #[expect(
     clippy::panic,
-    reason = "a program built with a bad file of its own; every test with kernels reads it"
+    reason = "an invalid file in the program itself; every test with kernels reads it"
 )]
 fn of_the_program<T: serde::de::DeserializeOwned>(text: &str) -> T {
     toml::from_str(text).unwrap_or_else(|error| panic!("built with an invalid file: {error}"))

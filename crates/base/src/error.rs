@@ -265,7 +265,7 @@ impl Cause for IoError {
                 "free some space or choose another --out, then run again: finished stages are kept"
             }
             ErrorKind::IsADirectory | ErrorKind::NotADirectory => {
-                "check the path: a file is where a folder is expected, or a folder where a file is expected"
+                "check the path: it names a file instead of a folder, or a folder instead of a file"
             }
             _ => "check the file and the disk, then run again",
         }
@@ -275,8 +275,7 @@ impl Cause for IoError {
     fn advice_on_configured(&self) -> String {
         let advice = self.advice();
         if self.source.kind() == std::io::ErrorKind::NotFound {
-            return advice
-                + "; relative paths in a configuration are relative to the folder of that file";
+            return advice + "; relative paths in a configuration file are relative to its folder";
         }
         advice
     }
@@ -317,7 +316,7 @@ mod tests {
         assert_eq!(
             failure.to_string(),
             "gusev/search_footprints: ap19019k.b: cannot read: entity not found\n  \
-             what to do: check the path; relative paths in a configuration are relative to the folder of that file"
+             what to do: check the path; relative paths in a configuration file are relative to its folder"
         );
         assert_eq!(failure.kind().exit_code(), 6);
     }

@@ -59,10 +59,10 @@ pub struct SourceFile {
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum AdjustmentModel {
-    /// Heights of tie points by the surface of all MOLA shots; orientations by a priori orbit and attitude.
+    /// Heights of tie points from the MOLA surface; orientations from the a priori orbit and attitude.
     MolaSurface,
-    /// As published: image coordinates of footprints hold the images, one standard deviation per image represents all
-    /// unknowns (Yoon & Shan 2004).
+    /// As published: image coordinates of footprints constrain the orientations, and one standard deviation per image
+    /// represents all unknowns (Yoon & Shan 2004).
     Published,
 }
 
@@ -83,17 +83,17 @@ impl AdjustmentModel {
     }
 }
 
-/// Use of image coordinates of footprints in an adjustment.
+/// Use of the image coordinates of footprints in an adjustment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum FootprintImageCoordinates {
-    /// Observations with their own standard deviations, as in the paper.
+    /// Observations with their own standard deviations, as in Yoon & Shan 2004.
     Weighted,
     /// Nothing.
     Off,
-    /// No observations, but projections with the adjusted orientation: a coordinate that follows the orientation has
-    /// no residual and carries no weight, no freedom and no covariance.
+    /// Projections with the adjusted orientation instead of observations: a coordinate that follows the orientation
+    /// has no residual, no weight, no degree of freedom and no covariance.
     Reproject,
 }
 

@@ -164,7 +164,7 @@ impl<Start: Frame, Middle: Frame, End: Frame> Mul<Rotation<Start, Middle>>
     fn mul(self, first: Rotation<Start, Middle>) -> Rotation<Start, End> {
         assert!(
             self.at == first.at,
-            "rotations of two instants, {} and {}",
+            "rotations at different instants, {} and {}",
             self.at,
             first.at
         );

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 pub struct ImageFields {
     /// Spacecraft clock at the start of the first line, for example `619971158:28`.
     pub sclk_start: Option<String>,
-    /// UTC at the start of the first line, used when there is no clock string.
+    /// UTC at the start of the first line, used if the clock string is missing.
     pub utc_start: Option<String>,
     /// Exposure of one detector line, seconds.
     pub exposure_s: Option<f64>,

@@ -56,7 +56,7 @@ pub struct Instrument {
 
 #[expect(
     clippy::trivially_copy_pass_by_ref,
-    reason = "serde hands fields over by reference"
+    reason = "serde passes fields by reference"
 )]
 fn id_of_spacecraft<S: Serializer>(
     spacecraft: &&'static Spacecraft,

@@ -67,7 +67,7 @@ struct Piece {
 
 /// Pieces that do not form a table of line times.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, Cause)]
-#[cause(Input: "check first lines, start times and line periods of the image's label")]
+#[cause(Input: "check the first lines, start times and line periods in the image label")]
 pub enum LineTimesError {
     /// No pieces.
     #[error("the table of line times has no pieces; expected one or more")]

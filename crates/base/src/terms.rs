@@ -103,9 +103,9 @@ impl Terms<'_> {
             "areoid" => self.areoid(),
             "asp_datum" => &self.body.map().asp_datum,
             "record" if self.has_tables => {
-                "line of the table of shots, counted from 1 with its heading"
+                "line of the table of shots, counted from 1, heading included"
             }
-            "record" => "record of the PEDR file, counted from 1 with its label records",
+            "record" => "record of the PEDR file, counted from 1, label records included",
             "shot_file" => self.shot_file(),
             "shot_source" => self.shot_source(),
             _ => return None,

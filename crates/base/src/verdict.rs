@@ -19,14 +19,14 @@ pub const NOT_TESTED: &str = "Not tested by the data:";
 pub struct Verdict {
     /// No limit is exceeded.
     pub valid: bool,
-    /// Every exceeded limit, with its profile or image.
+    /// Exceeded limits, each with the profile or image.
     pub reasons: Vec<String>,
-    /// Remarks for the reader although no limit is exceeded.
+    /// Remarks for the reader that concern no exceeded limit.
     pub remarks: Vec<String>,
-    /// Errors that no datum of the run can show, one phrase for each reason.
+    /// Errors that the data of the run cannot detect, one phrase per reason.
     #[serde(default, skip_serializing_if = "crate::stored::is_list_left_out")]
     pub untested: Vec<String>,
-    /// Every limit with the item that uses most of it, the worst first.
+    /// Every limit with the item that uses the largest share of it, worst first.
     #[serde(default)]
     pub checks: Vec<Check>,
 }

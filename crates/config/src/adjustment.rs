@@ -33,145 +33,152 @@ const SIGMAS_OF_POWERS: Several<Number, 9> = several(SIGMA_OR_FREE, "9 numbers")
 const SIGMAS_OF_TIME: Several<Number, 3> = several(SIGMA_OR_FREE, "3 numbers");
 
 declare_table! {
-    /// Combined adjustment of images, laser shots and tie points. Standard deviations are those of Yoon & Shan 2004 where
-    /// the paper gives one.
+    /// Combined adjustment of images, laser shots and tie points. Standard deviations are from Yoon & Shan 2004 where
+    /// that paper gives them.
     pub struct AdjustmentConfig: Deserialize {
-        /// Control of the adjustment. In the published model, image coordinates of footprints are computed from the
-        /// orientations under adjustment and hold them fixed; it is provided for comparison. Along the track it is the
-        /// paper's model. Across the track it differs: residuals refer to the line that sees the point, where the paper
-        /// uses the measured line. The mean corrections of MOLA across the track, 2.7 to 3.3 px in the paper, are then
-        /// 0, and the unit-weight standard deviation is about half of the published one.
+        /// Control of the adjustment. The published model (Yoon & Shan 2004) is provided for comparison: image
+        /// coordinates of footprints, computed from the orientations under adjustment, hold these orientations fixed.
+        /// Along the track, the model agrees with the paper. Across the track, residuals refer to the line that sees
+        /// the point, whereas the paper uses the measured line. The mean across-track corrections of MOLA, 2.7 to 3.3
+        /// px in the paper, are therefore 0, and the standard deviation of unit weight is about half of the published
+        /// value.
         model: AdjustmentModel = key(words_of(
             AdjustmentModel::WORDS,
             [
-                "the MOLA surface controls the heights of tie points, the a priori orbit and attitude control the \
-                orientations",
-                "image coordinates of footprints as observations, one standard deviation per image (Yoon & Shan 2004)",
+                "the MOLA surface controls the heights of tie points, and the a priori orbit and attitude control \
+                the orientations",
+                "image coordinates of footprints are observations, with one standard deviation per image (Yoon & Shan 2004)",
             ],
         )).or(AdjustmentModel::MolaSurface),
-        /// Standard deviations of tie points, along and across the track, in the focal plane (the paper); standard
-        /// deviations in a tie point file take precedence.
+        /// Standard deviations of tie point measurements, along and across the track, in the focal plane (Yoon & Shan
+        /// 2004); standard deviations in a tie point file take precedence.
         tie_sigma_px: [f64; 2] = key(SIGMAS).or([1.0, 1.0]),
-        /// Standard deviations of X, Y and Z of every image for the powers 0, 1, 2 of t, which is 0 in the middle of
-        /// the image and 1 at its end; inf leaves free, 0 holds fixed. Orbits of three families differ by up to 50 m
-        /// (Shan et al. 2005), and errors vary with the revolution.
+        /// Standard deviations of X, Y and Z of every image for the powers 0, 1 and 2 of t; t is 0 in the middle of the
+        /// image and 1 at its end. An unknown is free with inf and fixed with 0. The orbits of three producers differ
+        /// by up to 50 m (Shan et al. 2005), and orbit errors vary from revolution to revolution.
         position_sigma_m: [f64; 3] = key(SIGMAS_OF_TIME).or([25.0, 0.2, 0.0]),
-        /// Standard deviations of the rotations about the camera's axes for the same powers of t: 0.4 mrad, 150 m on
-        /// the ground, as required by the distances between images of a pair; drifts have the size of the attitude
-        /// residuals.
+        /// Standard deviations of the rotations about the camera axes for the powers 0, 1 and 2 of t, as in
+        /// `position_sigma_m`. The constant part, 0.4 mrad or 150 m on the ground, corresponds to the distances between
+        /// images of a pair, and the drifts to the attitude residuals.
         rotation_sigma_rad as "rotation_sigma_arcsec": [f64; 3] = key(SIGMAS_OF_TIME)
             .or([82.5, 2.0, 2.0])
             .map(|sigmas| sigmas.map(|sigma| sigma * RADIANS_PER_ARCSECOND)),
-        /// Powers of t that are unknowns of the position of every image, as jigsaw's spsolve; higher powers are not
-        /// estimated, regardless of their standard deviation.
+        /// Position unknowns of every image, as powers of t (spsolve in jigsaw); higher powers are not estimated,
+        /// regardless of their standard deviations.
         position_unknowns: PositionUnknowns = key(words_of(
             PositionUnknowns::WORDS,
-            ["", "a constant", "and a linear term in t", "and a quadratic term"],
+            ["", "a constant", "a constant and a linear term in t", "a constant, a linear and a quadratic term in t"],
         )).or(PositionUnknowns::Acceleration),
-        /// Powers of t that are unknowns of the rotations of every image, as jigsaw's camsolve.
+        /// Rotation unknowns of every image, as powers of t (camsolve in jigsaw).
         rotation_unknowns: RotationUnknowns = key(words_of(
             RotationUnknowns::WORDS,
-            ["", "constants", "and linear terms in t", "and quadratic terms"],
+            ["", "constants", "constants and linear terms in t", "constants, linear and quadratic terms in t"],
         )).or(RotationUnknowns::Acceleration),
-        /// Standard deviation of a delay of all lines of an image, which `rotation_sigma_arcsec` allows for together
-        /// with pitch: tie points cannot separate the two, so the delay is not an unknown. The stated standard
-        /// deviation of a camera's position along its track contains it. 45 ms are half the disagreement of the images
-        /// of a pair (Shan et al. 2005, Table 5); 0 assumes exact line times. With `time_bias_sigma_ms`,
-        /// `attitude_clock` or `boresight_line_time_sigma_ms` these apply instead.
+        /// Standard deviation of a common delay of all lines of an image. Tie points cannot separate delay and pitch:
+        /// the delay is not an unknown, and `rotation_sigma_arcsec` accounts for both. The stated standard deviations
+        /// of camera positions along the track include the delay. 45 ms is half the disagreement between the images of
+        /// a pair (Shan et al. 2005, Table 5); 0 assumes exact line times. If `time_bias_sigma_ms`, `attitude_clock` or
+        /// `boresight_line_time_sigma_ms` is in use, it applies instead of this key.
         line_time_sigma_s as "line_time_sigma_ms": f64 = key(SIGMA_OR_NONE)
             .or(45.0)
             .map(|milliseconds| milliseconds * SECONDS_PER_MS),
-        /// Whether the along-track disagreement of the images of a pair is attributed to one time offset of the
-        /// attitudes, the same for all images: it rotates nadir-following images, but not inertially held ones.
-        /// Otherwise all images are equally likely to be in error. Tie points cannot distinguish the two, so this is
-        /// a decision and not an estimate; where a pair disagrees by more than 100 m, the report and adjustment.json
-        /// give both.
+        /// Whether the along-track disagreement between the images of a pair is attributed to one time offset of the
+        /// attitudes of all images. This offset rotates nadir-following images, but not inertially held images.
+        /// Otherwise, all images are equally likely to be in error. Tie points cannot distinguish the two causes: this
+        /// key is a decision, not an estimate. Where the images of a pair disagree by more than 100 m, the report and
+        /// adjustment.json give both results.
         attitude_clock: bool = key(yes_or_no(
             "all images are equally likely to be in error",
             "nadir-following images are in error, by one offset",
         )).or(false),
-        /// Standard deviation of that offset.
+        /// Standard deviation of the time offset of the attitudes (`attitude_clock`).
         attitude_clock_sigma_s: f64 = key(SIGMA).or(1.0),
-        /// Upper limit of the standard deviation of the constant rotations of every image with this offset: 0.1 mrad.
-        /// A clock offset explains nothing if the attitude may err by as much without it.
+        /// Upper limit of the standard deviations of constant image rotations with `attitude_clock`: 0.1 mrad. A clock
+        /// offset explains nothing if the rotations alone may absorb the disagreement.
         attitude_clock_rotation_sigma_rad as "attitude_clock_rotation_sigma_arcsec": f64 = key(SIGMA)
             .or(20.6)
             .map(|sigma| sigma * RADIANS_PER_ARCSECOND),
         /// Whether the a priori position of an image exposed during a profile is taken from the PEDR file, not from the
-        /// kernels: camera and altimeter then share one orbit. The range check reports the distance between the two.
+        /// kernels: camera and altimeter then share one orbit. The range check reports the distance between the two
+        /// orbits.
         orbit_of_pedr: bool = key(yes_or_no(
-            "the orbit of the kernels",
-            "the orbit of the kernels, moved by the mean distance over the profile",
+            "the orbit from the kernels",
+            "the orbit from the kernels, shifted by the mean distance to the PEDR orbit over the profile",
         )).or(false),
-        /// Whether heights of tie points on slopes of the MOLA surface also determine the images in plan. Useful
-        /// where the report states that relief determines the position to less than half of the a priori standard
-        /// deviation: ground rougher than 25 m over 300 m for measurements of a pixel, 7 m for 0.3 pixels.
+        /// Whether heights of tie points on slopes of the MOLA surface also determine the images in plan. This is
+        /// useful where, according to the report, relief determines the position to less than half of the a priori
+        /// standard deviation. The roughness over 300 m then exceeds 25 m for measurement errors of one pixel, or 7 m
+        /// for 0.3 pixels.
         relief_for_plan: bool = key(yes_or_no(
-            "a slope only increases the uncertainty of heights",
-            "each profile may be offset in plan, and tie points move to where their heights fit",
+            "slopes only increase the uncertainty of heights",
+            "each profile may be offset in plan, and tie points shift until their heights fit",
         )).or(false),
-        /// Whether the position of the laser in a simultaneous image is an observation: camera and laser share one
-        /// bus, so that the mounting determines it, regardless of the attitude. It requires profiles simultaneous
-        /// with the images, whose position is known to `laser_surface.profile_plan_sigma_m`; each profile may then be
-        /// offset in plan, and the boresight of the laser may differ from its file and the frame kernels.
+        /// Whether the position of a laser spot in a simultaneous image is an observation: the mounting of camera and
+        /// laser on one bus determines this position, regardless of the attitude. The option requires profiles
+        /// simultaneous with the images, with positions known to `laser_surface.profile_plan_sigma_m`. Each profile may
+        /// then be offset in plan, and the laser boresight may differ from the altimeter file and the frame kernels.
         common_bus: bool = key(yes_or_no(
             "footprints do not constrain the attitude",
-            "the mounting gives the position of a footprint in the simultaneous image",
+            "the mounting determines the position of a footprint in the simultaneous image",
         )).or(false),
-        /// Standard deviation of the two boresight angles of the laser, the same for all images: 0.1 mrad. No
-        /// alignment with its standard deviation is published; the narrow-angle camera was aligned in flight with the
-        /// altimeter (Kirk et al. 2001).
+        /// Standard deviation of the two boresight angles of the laser, which apply to all images: 0.1 mrad. No
+        /// alignment has been published with a standard deviation; the narrow-angle camera was aligned with the
+        /// altimeter in flight (Kirk et al. 2001).
         boresight_sigma_rad as "boresight_sigma_arcsec": f64 = key(SIGMA_OR_NONE)
             .or(20.6)
             .map(|sigma| sigma * RADIANS_PER_ARCSECOND),
-        /// Standard deviation of the delay of the line times of each image relative to the shots. Along the track the
-        /// delay cannot be separated from the boresight of the laser: without this key the along-track observation is
-        /// not used, since `rotation_sigma_arcsec` already allows for line times and pitch together; 0 assumes exact
+        /// Standard deviation of the delay of the line times of each image relative to the shots. Along the track, the
+        /// delay cannot be separated from the laser boresight. Without this key, the along-track observation is not
+        /// used, because `rotation_sigma_arcsec` already accounts for line times and pitch together; 0 assumes exact
         /// line times.
         boresight_line_time_sigma_s as "boresight_line_time_sigma_ms": Option<f64> = key(SIGMA_OR_NONE)
             .unused("0.0")
             .map(|milliseconds| milliseconds.map(|milliseconds| milliseconds * SECONDS_PER_MS)),
-        /// Use of the image coordinates of footprints: "off" unless the model is the published one, where it is
-        /// "weighted". They are computed from the orientation under adjustment and are not independent measurements.
+        /// Use of the image coordinates of footprints, by default "weighted" in the published model and "off"
+        /// otherwise. These coordinates are computed from the orientation under adjustment and are not independent
+        /// measurements.
         footprint_image_coordinates: Option<FootprintImageCoordinates> = key(words_of(
             FootprintImageCoordinates::WORDS,
             [
                 "observations",
-                "nothing",
-                "projections with the adjusted orientation, without weight, freedom or covariance",
+                "not used",
+                "projected with the adjusted orientation, without weight, degrees of freedom or covariance",
             ],
         )).unused(r#""off""#).was("mola_image"),
-        /// Their standard deviations, along and across the track, in the focal plane: one MOLA spacing (325 m
-        /// at 4.4 m a pixel), and 4; the paper gives none.
+        /// Standard deviations of the image coordinates of footprints, along and across the track, in the focal plane:
+        /// one MOLA shot spacing (325 m at 4.4 m per pixel), and 4; Yoon & Shan 2004 give none.
         footprint_sigma_px: [f64; 2] = key(SIGMAS).or([74.0, 4.0]).was("mola_sigma_px"),
-        /// Distance outside an image within which a footprint still counts as seen by it.
+        /// Margin around an image within which a footprint still counts as inside this image.
         footprint_margin_px: f64 = key(from_to(0.0, 1e4)).or(200.0).was("mola_margin_px"),
-        /// Standard deviation of footprint coordinates (the paper).
+        /// Standard deviation of footprint coordinates (Yoon & Shan 2004).
         ground_sigma_m: f64 = key(SIGMA).or(10.0),
-        /// Standard deviation of ranges (the paper; the instrument: 7 m at 400 km).
+        /// Standard deviation of ranges (Yoon & Shan 2004; instrument: 7 m at 400 km).
         range_sigma_m: f64 = key(SIGMA).or(10.0),
-        /// Range bias of each profile as an unknown with this standard deviation; 0 for no such unknown. Biases
-        /// up to 25 m occur off nadir (Table 3 of Shan et al. 2005). The default is 30, and no
-        /// such unknown in the published model.
+        /// Standard deviation of the range bias of each profile, an unknown of the adjustment; 0 omits this unknown.
+        /// Biases of up to 25 m occur off nadir (Shan et al. 2005, Table 3). The default is 30, or 0 in the published
+        /// model.
         range_bias_sigma_m: Option<f64> = key(SIGMA_OR_NONE).unused("30.0"),
-        /// Time bias of each image as an unknown with this standard deviation; 0 for no such unknown.
+        /// Standard deviation of the time bias of each image, an unknown of the adjustment; 0 omits this unknown.
         time_bias_sigma_s as "time_bias_sigma_ms": f64 =
             key(SIGMA_OR_NONE).or(0.0).map(|milliseconds| milliseconds * SECONDS_PER_MS),
-        /// Published model: standard deviation of the position unknowns of images that look to nadir (within 5
-        /// degrees); inf leaves free, 0 holds fixed. Rotations get the equivalent on the ground (the paper).
+        /// Published model: standard deviation of the position unknowns of images within 5 degrees of nadir. An unknown
+        /// is free with inf and fixed with 0. Rotations have the equivalent standard deviation on the ground (Yoon &
+        /// Shan 2004).
         position_sigma_nadir_m: Option<f64> = key(SIGMA_OR_FREE).unused("100.0").was("nadir_sigma_m"),
-        /// Published model: standard deviation of the position unknowns of all other images (the paper).
+        /// Published model: standard deviation of the position unknowns of images more than 5 degrees off nadir (Yoon &
+        /// Shan 2004).
         position_sigma_off_nadir_m: Option<f64> =
             key(SIGMA_OR_FREE).unused("200.0").was("off_nadir_sigma_m"),
-        /// Weights of image coordinates that fall with their residual.
+        /// Robust weights of image coordinates, which decrease with increasing residuals.
         robust: Option<RobustWeight> = group::<RobustKeys>().map(RobustKeys::weight),
-        /// Standardised residual above which a tie point is a blunder and rejected; 0 keeps all. One good observation
-        /// in a thousand exceeds the default.
+        /// Standardised residual above which a tie point is rejected as a blunder; 0 keeps all tie points. One valid
+        /// observation in a thousand exceeds the default.
         blunder_limit: Option<f64> = key(from_to(0.0, 1000.0))
             .or(BAARDA_LIMIT)
             .map(|limit| (limit > 0.0).then_some(limit)),
-        /// Height above or below the MOLA surface, in standard deviations, beyond which a tie point is rejected as a blunder
-        /// unless a neighbour deviates to the same side; 0 keeps all. Not used in the published model.
+        /// Height above or below the MOLA surface, in standard deviations, beyond which a tie point is rejected as a
+        /// blunder unless a neighbour deviates in the same direction; 0 keeps all tie points. Not used in the published
+        /// model.
         height_blunder_limit: Option<f64> = key(from_to(0.0, 1000.0))
             .or(5.0)
             .map(|limit| (limit > 0.0).then_some(limit)),
@@ -239,14 +246,14 @@ impl AdjustmentConfig {
 declare_table! {
     /// Robust estimation.
     struct RobustKeys {
-        /// Weights of image coordinates that fall with their residual.
+        /// Robust weights of image coordinates, which decrease with increasing residuals.
         robust: Option<RobustWeight> = key(words([
             ("none", None, ""),
             ("huber", Some(RobustWeight::Huber { limit: RobustWeight::HUBER_LIMIT }), ""),
             ("cauchy", Some(RobustWeight::Cauchy { limit: RobustWeight::CAUCHY_LIMIT }), ""),
         ])).or(None),
-        /// Normalised residual from which (huber, default 1.345) or at which half (cauchy, default 2.385) the
-        /// weight falls.
+        /// Normalised residual above which the weight decreases (huber, default 1.345), or at which the weight is one
+        /// half (cauchy, default 2.385).
         robust_limit: Option<f64> = key(above_to(0.0, 1000.0)).unused("1.345"),
     }
     check limit_is_used
@@ -269,23 +276,23 @@ impl RobustKeys {
 }
 
 declare_table! {
-    /// Images whose unknowns have their own standard deviations; of each image X, Y, Z, or rotations about the
-    /// camera's x, y, z, each with the powers 0, 1, 2 of t, which is 0 in the middle of the image and 1 at its
-    /// end.
+    /// Images whose unknowns have individual standard deviations: X, Y and Z, or rotations about the camera's x, y and
+    /// z axes, each for the powers 0, 1 and 2 of t; t is 0 in the middle of the image and 1 at its end.
     pub struct OrientationPrior: Deserialize {
         /// Identifier of the image.
         id: String = key(identifier()).required().unused(r#""E02-02855""#),
-        /// X, Y, Z; inf leaves free, 0 holds fixed.
+        /// Standard deviations of X, Y and Z for each power of t. An unknown is free with inf and fixed with 0.
         position_m: Option<[f64; 9]> = key(SIGMAS_OF_POWERS)
             .unused("[100.0, 100.0, 100.0, 100.0, 100.0, 100.0, 100.0, 100.0, 100.0]"),
-        /// Rotations about the camera's x, y and z; inf leaves free, 0 holds fixed.
+        /// Standard deviations of the rotations about the camera's x, y and z axes for each power of t. An unknown is
+        /// free with inf and fixed with 0.
         rotation_rad as "rotation_arcsec": Option<[f64; 9]> = key(SIGMAS_OF_POWERS)
             .unused("[54.0, 54.0, 54.0, 54.0, 54.0, 54.0, 54.0, 54.0, 54.0]")
             .map(|sigmas| sigmas.map(|sigmas| sigmas.map(|sigma| sigma * RADIANS_PER_ARCSECOND))),
-        /// Unknown powers of t of the image's position; without this key, those of `[adjustment]`.
+        /// Position unknowns of the image, as powers of t; the default is the key in `[adjustment]`.
         position_unknowns: Option<PositionUnknowns> =
             key(words_of(PositionUnknowns::WORDS, [""; 4])).unused(r#""acceleration""#),
-        /// Unknown powers of t of the image's rotations; without this key, those of `[adjustment]`.
+        /// Rotation unknowns of the image, as powers of t; the default is the key in `[adjustment]`.
         rotation_unknowns: Option<RotationUnknowns> =
             key(words_of(RotationUnknowns::WORDS, [""; 4])).unused(r#""acceleration""#),
     }

@@ -36,11 +36,11 @@ const CAMERAS: Many = Many {
 declare_table! {
     /// Everything that `areograph calibrate` needs to know: every value checked, metres and radians inside.
     pub struct CalibrationConfig {
-        /// Identifier, and the name of the folder of its products.
+        /// Identifier of the calibration, and name of its products folder.
         calibration: String = key(lower_case_identifier()).required().example(r#""hrsc_i864""#),
         /// Free text for the report.
         description: String = key(any_text()).or(String::new()).example(r#""Stereo lines over orbit I864""#),
-        /// The body; support data of a different body are refused.
+        /// Body that the cameras observe; support data of a different body are refused.
         body: Body = key(words([
             ("mars", Body::Mars, "in IAU 2000"),
             ("moon", Body::Moon, "in the mean Earth/polar axis frame"),
@@ -72,18 +72,18 @@ declare_table! {
 impl Document for CalibrationConfig {
     const EXAMPLE: &'static str = "config/calibrations/example.toml";
     const HEADER: &'static str = "\
-# A calibration of the lines of a camera for `areograph calibrate`, every key with its unit, range and default.
+# Calibration of the lines of a camera with `areograph calibrate`: every key with its unit, range and default.
 #
-# Only `calibration`, two [[cameras]] and [ties] are required; a key that is left out has the default given
-# here. Without [control] absolute pointing is not determined, and the result is marked invalid. If every camera has
-# `pixels`, ties.match and [laser] replace tables of points. Relative paths are relative to the folder of this file.
+# Only `calibration`, two [[cameras]] and [ties] are required; an omitted key has the default given here.
+# Without [control], absolute pointing is not determined, and the result is marked invalid. If every camera has
+# `pixels`, ties.match and [laser] can replace tables of points. Relative paths are relative to the folder of this file.
 # Schema: ../schema/calibration.schema.json
 
 ";
     const SCHEMA: [&'static str; 2] = [
         "Calibration of the lines of a camera by areograph",
-        "The TOML file of one calibration as JSON. areograph checks more than a schema can: existence of files, \
-         agreement between keys.",
+        "The TOML file of one calibration as JSON. areograph checks more than a schema can: the existence of \
+         files and the agreement between keys.",
     ];
 
     fn with_file(self, file: PathBuf, blake3: String, keys: BTreeMap<String, String>) -> Self {
@@ -123,7 +123,7 @@ fn from_pixels(written: &CalibrationConfig, keys: &mut Keys<'_, '_>) {
         if keys.span_of("laser").is_some() {
             keys.missing(
                 "ties.match",
-                "ties.match = true, since a table laser finds control points in a terrain model of matched pixels",
+                "ties.match = true, because [laser] finds control points in a terrain model of matched pixels",
             );
         }
         return;
@@ -131,7 +131,7 @@ fn from_pixels(written: &CalibrationConfig, keys: &mut Keys<'_, '_>) {
     if keys.span_of("laser").is_none() {
         keys.missing(
             "laser",
-            "a table laser with files and cell_m, since tie points are matched (ties.match)",
+            "a table [laser] with files and cell_m, because tie points are matched (ties.match)",
         );
     }
     let entries = keys.entries(&["cameras"]);
@@ -142,7 +142,7 @@ fn from_pixels(written: &CalibrationConfig, keys: &mut Keys<'_, '_>) {
             camera.span(),
             "cameras.pixels",
             format!(
-                "a file with the pixels of camera {id}, since tie points are matched (ties.match)"
+                "a file with the pixels of camera {id}, because tie points are matched (ties.match)"
             ),
         );
     }
@@ -155,7 +155,7 @@ fn from_pixels(written: &CalibrationConfig, keys: &mut Keys<'_, '_>) {
             keys.review().refuse(
                 span,
                 key,
-                "no table of points: with ties.match points are measured in pixels",
+                "no table of points: with ties.match, points are measured in pixels",
             );
         }
     }
@@ -166,32 +166,32 @@ declare_table! {
     pub struct CameraConfig {
         /// Name of the line in tables of points.
         id: String = key(identifier()).required().example(r#""s1""#),
-        /// Image support data (ISD) of its image, as ALE writes them: the calibration starts from their mounting, focal
-        /// length and pixels. `instrument_pointing` of all cameras must end in one frame, that of the spacecraft,
-        /// before `constant_rotation` leads to each of them.
+        /// Image support data (ISD) of the line, as written by ALE: the calibration starts from their mounting, focal
+        /// length and pixels. `instrument_pointing` of all cameras must end in one frame, the spacecraft frame, from
+        /// which `constant_rotation` leads to each camera.
         #[serde(skip)]
         isd: PathBuf = key(FILE).required().example(r#""isd/s1.json""#),
-        /// The pixels of the whole image: TIFF or PNG of one band of grey, or a cube. Only for ties.match.
+        /// Pixels of the whole image: a greyscale TIFF or PNG of one band, or a cube. Only for ties.match.
         #[serde(skip)]
         pixels: Option<PathBuf> = key(FILE).unused(r#""images/s1.tif""#),
     }
 }
 
 declare_table! {
-    /// Points that several lines of the camera see.
+    /// Tie points in the images of several camera lines.
     pub struct CalibrationTiesConfig {
-        /// Paths or globs of tables (.csv), one row per image of a point: `point`, `camera`, `line`, `sample` (0 at
-        /// the outer edge of the first line and sample), and where known `sigma_line`, `sigma_sample`.
+        /// Paths or globs of tables (.csv), one row per measurement: `point`, `camera`, `line`, `sample` (0 at the
+        /// outer edge of the first line and sample) and, where known, `sigma_line`, `sigma_sample`.
         #[serde(skip)]
         files: Vec<PathBuf> = key(Globs).or(Vec::new()).example(r#"["ties.csv"]"#),
-        /// Whether areograph measures tie points itself, in the `pixels` of all cameras. Tie points, terrain model,
-        /// laser control and calibration then follow each other in rounds, each with the cameras of the preceding
-        /// round (Li et al. 2023), until convergence.
+        /// Whether areograph measures tie points itself, in the `pixels` of all cameras. Rounds of tie points, terrain
+        /// model, laser control and calibration then follow until convergence, each with the cameras of the preceding
+        /// round (Li et al. 2023).
         matched as "match": bool = key(Switch).or(false),
-        /// Standard deviation of lines and samples, where the table has none.
+        /// Standard deviation of measured lines and samples, if missing from the table.
         sigma_px: f64 = key(from_to(SIGMA_MIN, 100.0)).or(0.2),
-        /// Distance between the images of a tie point and the projections of one ground point by the uncalibrated
-        /// cameras, beyond which the tie point is rejected.
+        /// Distance between the measurements of a tie point and the projections of one ground point with the
+        /// uncalibrated cameras, beyond which the tie point is rejected.
         limit_px: f64 = key(from_to(1.0, 1e4)).or(100.0),
     }
     check something_measures
@@ -214,30 +214,30 @@ fn something_measures(ties: &CalibrationTiesConfig, keys: &mut Keys<'_, '_>) {
 }
 
 declare_table! {
-    /// Laser passes over the ground of the images, in which control points are found by a terrain model of the two
-    /// lines with the largest convergence, as `areograph pedr match` does. Only for ties.match.
+    /// Laser passes over the ground of the images. As in `areograph pedr match`, a terrain model from the two lines
+    /// with the largest convergence locates control points in these passes. Only for ties.match.
     pub struct CalibrationLaserConfig {
         /// Paths or globs of PEDR files.
         #[serde(skip)]
         files: Vec<PathBuf> = key(Globs).or(Vec::new()).unused(r#"["pedr/*.b"]"#),
-        /// Edge of a cell of the terrain model, metres. It is at least one pixel.
+        /// Edge of a cell of the terrain model, metres; at least one pixel.
         cell_m: Option<f64> = key(above_to(0.0, 1e5)).unused("100.0"),
-        /// Search radius of the shifts of a unit of shots, cells: the possible error of orbit and mounting.
+        /// Search radius for the shift of a unit of shots, cells: the largest possible error of orbit and mounting.
         search_cells: u32 = key(whole_from_to(1, 500)).or(70),
         /// Maximum number of shots in a segment.
         segment_points: u32 = key(whole_from_to(3, 1_000)).or(15),
-        /// Variance of heights that a segment must exceed, square metres.
+        /// Height variance that a segment must exceed, square metres.
         least_variance_m2: f64 = key(above_to(0.0, 1e9)).or(1_000.0),
-        /// Similarity that a unit must exceed.
+        /// Similarity to the terrain model that a unit of shots must exceed.
         least_score: f64 = key(from_to(0.01, 0.999)).or(0.9),
-        /// Largest root mean square of model minus laser at shots withheld from the search, bias removed, metres.
+        /// Largest root mean square of model minus laser heights at shots withheld from the search, without bias,
+        /// metres.
         limit_m: f64 = key(above_to(0.0, 1e5)).or(60.0),
-        /// Seed of the clusters of shots and of the withheld ground.
+        /// Random seed for the clusters of shots and the withheld ground.
         seed: u32 = key(whole_from_to(0, u32::MAX)).or(1),
-        /// Maximum number of rounds; a calibration that has not converged by then is invalid.
+        /// Maximum number of rounds; a calibration that has not converged after these rounds is invalid.
         rounds_max: u32 = key(whole_from_to(1, 100)).or(10),
-        /// Shot radius that counts as the radius of the ground: corrected by the crossover residuals of the files, or
-        /// raw.
+        /// Shot radius used as the radius of the ground: corrected by the crossover residuals of the files, or raw.
         crossover: GroundRadius = key(ground_radius()).or(GroundRadius::Corrected),
         /// Shots to keep.
         filter: ShotFilter = table(),
@@ -257,49 +257,51 @@ fn what_is_searched(laser: &CalibrationLaserConfig, keys: &mut Keys<'_, '_>) {
 }
 
 declare_table! {
-    /// Points located by the laser. Without them only differences between the cameras can be determined.
+    /// Points located by the laser. Without such points, only differences between the cameras can be determined.
     pub struct CalibrationControlConfig {
-        /// Paths or globs of tables (.csv), one row per image of a point: `point`, `camera`, `line`, `sample`,
-        /// `longitude_deg` (east), `latitude_deg` (areocentric), `radius_m` (from the centre of the body: heights
-        /// have a datum), and where known `sigma_line`, `sigma_sample`, `sigma_horizontal_m`, `sigma_vertical_m`, and
-        /// the contribution of matching to these, `sigma_matching_horizontal_m`, `sigma_matching_vertical_m`.
+        /// Paths or globs of tables (.csv), one row per measurement: `point`, `camera`, `line`, `sample`,
+        /// `longitude_deg` (east), `latitude_deg` (areocentric) and `radius_m` (from the centre of the body, not a
+        /// height above a datum). Where known: `sigma_line`, `sigma_sample`, `sigma_horizontal_m`, `sigma_vertical_m`,
+        /// and the contributions of matching to the latter two, `sigma_matching_horizontal_m` and
+        /// `sigma_matching_vertical_m`.
         #[serde(skip)]
         files: Vec<PathBuf> = key(Globs).or(Vec::new()).example(r#"["control.csv"]"#),
-        /// Standard deviation of lines and samples, where the table has none.
+        /// Standard deviation of measured lines and samples, if missing from the table.
         sigma_px: f64 = key(from_to(SIGMA_MIN, 100.0)).or(1.0),
-        /// Standard deviation of a horizontal coordinate of a laser point, where the table has none: the profiles of
-        /// MOLA. With `ties.match` the uncertainty of matching is added to it. Beyond the permitted range, the ground
-        /// departs from the plane in which errors are computed.
+        /// Standard deviation of a horizontal coordinate of a laser point, if missing from the table; the default
+        /// applies to MOLA profiles. With `ties.match`, the uncertainty of matching is added. Beyond the permitted
+        /// range, the ground departs from the plane in which errors are computed.
         sigma_horizontal_m: f64 = key(from_to(SIGMA_MIN, CONTROL_SIGMA_MAX_M)).or(100.0),
-        /// Standard deviation of the radius of a laser point, under the same conditions.
+        /// Standard deviation of the radius of a laser point, under the conditions of `sigma_horizontal_m`.
         sigma_vertical_m: f64 = key(from_to(SIGMA_MIN, CONTROL_SIGMA_MAX_M)).or(10.0),
-        /// Every n-th control point along the flight is withheld for validation; with `ties.match`, every n-th 5 km by
-        /// 10 km rectangle on the ground, with all of its shots.
+        /// Interval n of withheld control: every n-th control point along the flight is withheld for validation; with
+        /// `ties.match`, all shots in every n-th 5 km by 10 km rectangle on the ground.
         held_back_every: u32 = key(whole_from_to(2, 100)).or(4),
-        /// Distance between a control point and its projection by the uncalibrated cameras, beyond which the point is
-        /// rejected.
+        /// Distance between the measurement of a control point and its projection with the uncalibrated cameras, beyond
+        /// which the point is rejected.
         limit_px: f64 = key(from_to(1.0, 1e4)).or(300.0),
     }
 }
 
 declare_table! {
-    /// A priori values, one standard deviation each. The first three are those of Li et al. 2023, table 2.
+    /// A priori standard deviations. `orbit_bias_m`, `orbit_drift_m_per_line` and `angle_deg` are from Li et al. 2023,
+    /// Table 2.
     pub struct APrioriConfig {
-        /// Standard deviation of an orbit coordinate. It is not estimated, since offsets of the camera absorb it; with
-        /// `angle_deg` it determines how far a calibration may move the image.
+        /// Standard deviation of an orbit coordinate. Its error is not estimated, because the offset angles of the
+        /// camera absorb it. Together with `angle_deg`, this key limits the shift of the image by a calibration.
         orbit_bias_m: f64 = key(from_to(1e-3, 1e5)).or(1_000.0),
         /// Standard deviation of the drift of an orbit coordinate per image line.
         orbit_drift_m_per_line: f64 = key(from_to(1e-6, 10.0)).or(0.01),
-        /// Standard deviation of an offset angle in the solution by tie points only.
+        /// Standard deviation of an offset angle in the solution from tie points alone.
         angle_rad as "angle_deg": f64 =
             key(from_to(1e-4, 10.0)).or(0.025).map(|degrees| degrees * RADIANS_PER_DEGREE),
-        /// Standard deviation of an offset angle in the solution with control: wide, since it absorbs the remaining
-        /// error of the orbit.
+        /// Standard deviation of an offset angle in the solution with control: large, because the angle absorbs the
+        /// remaining orbit error.
         control_angle_rad as "control_angle_deg": f64 =
             key(from_to(1e-3, 10.0)).or(1.0).map(|degrees| degrees * RADIANS_PER_DEGREE),
-        /// Standard deviation of the constant and the slope of the look angles, at the edge of the image.
+        /// Standard deviation of the constant and linear terms of the look angles, at the edge of the image.
         look_px: f64 = key(from_to(1e-3, 1e4)).or(50.0),
-        /// Standard deviation of the bending of the look angles (the higher coefficients), at the edge of the image.
+        /// Standard deviation of the higher-order terms of the look angles, at the edge of the image.
         bend_px: f64 = key(from_to(1e-4, 1e4)).or(0.5),
     }
 }
@@ -307,16 +309,16 @@ declare_table! {
 declare_table! {
     /// Solution of the calibration.
     pub struct SolutionConfig {
-        /// Parameters that tie points estimate before control is used.
+        /// Parameters estimated from tie points before control is used.
         mode: CalibrationMode = key(words([
             ("differential", CalibrationMode::Differential, "differences in roll and scale between the cameras, which tie points determine"),
             (
                 "as_published",
                 CalibrationMode::AsPublished,
-                "all angles of all cameras; ties determine some combinations weakly or not at all, so that the camera can drift away",
+                "all angles of all cameras; tie points determine some combinations weakly or not at all: the camera may drift",
             ),
         ])).or(CalibrationMode::Differential),
-        /// Order of the polynomials of the look angles.
+        /// Order of the look angle polynomials.
         order: u32 = key(whole_from_to(2, 3)).or(2),
     }
 }
@@ -326,7 +328,7 @@ declare_table! {
     pub struct ValidationConfig {
         /// Name of the orbit.
         id: String = key(identifier()).required().example(r#""i818""#),
-        /// Paths or globs of its image support data, one file per camera, identified by `name_sensor`.
+        /// Paths or globs of the image support data of this orbit, one file per camera, identified by `name_sensor`.
         #[serde(skip)]
         isd: Vec<PathBuf> = key(Globs).required_as("paths or globs of image support data").example(r#"["isd/i818_*.json"]"#),
         /// Tables of the tie points of this orbit.
@@ -339,7 +341,7 @@ declare_table! {
     }
 }
 
-/// Parameters that tie points estimate before control is used.
+/// Parameters estimated from tie points before control is used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CalibrationMode {

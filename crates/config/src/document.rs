@@ -22,7 +22,7 @@ use super::{
 const BYTES_MAX: u64 = 1 << 20;
 
 /// A kind of configuration file. It is implemented by the tables that this crate declares.
-#[allow(private_bounds, reason = "keys can be declared in this crate only")]
+#[allow(private_bounds, reason = "keys can be declared only in this crate")]
 pub trait Document: Table {
     /// The example, in which every key is documented.
     const EXAMPLE: &'static str;
@@ -125,7 +125,7 @@ pub(super) fn read(path: &Path) -> Result<String, Error> {
         let byte = error.utf8_error().valid_up_to() + 1;
         Problems::of_file(
             path,
-            &format!("is not UTF-8 from byte {byte}; expected text"),
+            &format!("is not valid UTF-8 from byte {byte}; expected UTF-8 text"),
         )
         .into()
     })

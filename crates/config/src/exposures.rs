@@ -64,14 +64,14 @@ impl ExposureRows {
             found.refuse(
                 review,
                 format!(
-                    "a row whose first number is a line, a whole number from 0 below {LINES_MAX}"
+                    "a row whose first number is a line: a whole number from 0 below {LINES_MAX}"
                 ),
             );
             return None;
         }
         if !(period_ms > 0.0 && period_ms <= MILLISECONDS_MAX) {
             let expected = format!(
-                "a row whose third number is a line period, above 0, at most {MILLISECONDS_MAX} milliseconds"
+                "a row whose third number is a line period: above 0, at most {MILLISECONDS_MAX} milliseconds"
             );
             found.refuse(review, expected);
             return None;
@@ -79,7 +79,7 @@ impl ExposureRows {
         #[allow(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
-            reason = "a whole number within the lines of an image, as was just found"
+            reason = "a whole number within the lines of an image, as checked above"
         )]
         let first_line = first_line as u32;
         Some(ExposurePiece {

@@ -36,23 +36,24 @@ pub(super) enum GeoJsonError {
 
 #[derive(Debug, thiserror::Error)]
 pub(super) enum RingError {
-    #[error("has {0} positions; at least 4 make a closed ring")]
+    #[error("has {0} positions; expected at least 4 for a closed ring")]
     Short(usize),
     #[error("is not closed: its last position must repeat its first")]
     Open,
-    #[error("position {0} has fewer than two numbers")]
+    #[error("position {0} has fewer than two numbers; expected [longitude, latitude]")]
     Position(usize),
-    #[error("position {0}: longitude {1} is not within -180 to 360")]
+    #[error("position {0}: longitude is {1}; expected -180 to 360")]
     Longitude(usize, f64),
-    #[error("position {0}: latitude {1} is not within -90 to 90")]
+    #[error("position {0}: latitude is {1}; expected -90 to 90")]
     Latitude(usize, f64),
-    #[error("crosses itself: the edge after position {0} and the edge after position {1} meet")]
+    #[error("crosses itself: the edges after positions {0} and {1} meet")]
     Crossed(usize, usize),
-    #[error("spans {0} degrees of longitude; a ring spans less than 360")]
+    #[error("spans {0} degrees of longitude; expected less than 360")]
     Wide(f64),
     #[error(
-        "position {0}: longitude goes from {1} to {2} in one edge, more than 180 degrees: put positions between, or cross 180 degrees \
-         with a ring narrower than 90 degrees whose longitudes are within -180 to 180, and 0 degrees with negative longitudes"
+        "position {0}: longitude changes from {1} to {2} in one edge; expected at most 180 degrees. Insert positions, or cross \
+         180 degrees with a ring narrower than 90 degrees with longitudes within -180 to 180, and 0 degrees with negative \
+         longitudes"
     )]
     WideEdge(usize, f64, f64),
 }
@@ -265,11 +266,11 @@ mod tests {
         for (ring, expected) in [
             (
                 "",
-                "polygon 1 ring 1 has 0 positions; at least 4 make a closed ring",
+                "polygon 1 ring 1 has 0 positions; expected at least 4 for a closed ring",
             ),
             (
                 "[[0,0],[1,0],[0,0]]",
-                "polygon 1 ring 1 has 3 positions; at least 4 make a closed ring",
+                "polygon 1 ring 1 has 3 positions; expected at least 4 for a closed ring",
             ),
             (
                 "[[0,0],[1,0],[1,1],[0,1]]",
@@ -277,33 +278,34 @@ mod tests {
             ),
             (
                 "[[0,0],[1],[1,1],[0,0]]",
-                "polygon 1 ring 1 position 2 has fewer than two numbers",
+                "polygon 1 ring 1 position 2 has fewer than two numbers; expected [longitude, latitude]",
             ),
             (
                 "[[0,0],[361,0],[1,1],[0,0]]",
-                "polygon 1 ring 1 position 2: longitude 361 is not within -180 to 360",
+                "polygon 1 ring 1 position 2: longitude is 361; expected -180 to 360",
             ),
             (
                 "[[0,0],[1,0],[1,91],[0,0]]",
-                "polygon 1 ring 1 position 3: latitude 91 is not within -90 to 90",
+                "polygon 1 ring 1 position 3: latitude is 91; expected -90 to 90",
             ),
             (
                 "[[0,0],[10,10],[10,0],[0,10],[0,0]]",
-                "polygon 1 ring 1 crosses itself: the edge after position 1 and the edge after position 3 meet",
+                "polygon 1 ring 1 crosses itself: the edges after positions 1 and 3 meet",
             ),
             (
                 "[[175,0],[-175,10],[-175,0],[175,10],[175,0]]",
-                "polygon 1 ring 1 crosses itself: the edge after position 1 and the edge after position 3 meet",
+                "polygon 1 ring 1 crosses itself: the edges after positions 1 and 3 meet",
             ),
             (
                 "[[0,-5],[200,-5],[200,5],[0,5],[0,-5]]",
-                "polygon 1 ring 1 position 2: longitude goes from 0 to 200 in one edge, more than 180 degrees: put positions between, or \
-                 cross 180 degrees with a ring narrower than 90 degrees whose longitudes are within -180 to 180, and 0 degrees with \
+                "polygon 1 ring 1 position 2: longitude changes from 0 to 200 in one edge; expected at most 180 degrees. Insert \
+                 positions, or cross 180 degrees with a ring narrower than 90 degrees with longitudes within -180 to 180, and \
+                 0 degrees with \
                  negative longitudes",
             ),
             (
                 "[[-180,0],[180,0],[1,1],[-180,0]]",
-                "polygon 1 ring 1 spans 360 degrees of longitude; a ring spans less than 360",
+                "polygon 1 ring 1 spans 360 degrees of longitude; expected less than 360",
             ),
         ] {
             assert_eq!(message(&polygon(ring)), expected);
@@ -336,7 +338,7 @@ mod tests {
             ("[[0,0],[120,10],[240,0],[0,0]]", 4),
         ] {
             let told = message(&format!(r#"{{"type":"Polygon","coordinates":[{ring}]}}"#));
-            let expected = format!("polygon 1 ring 1 position {position}: longitude goes from");
+            let expected = format!("polygon 1 ring 1 position {position}: longitude changes from");
             assert!(told.starts_with(&expected), "{ring}: {told}");
         }
     }

@@ -31,63 +31,68 @@ const DETECTORS_MAX: u32 = 8_192;
 /// Images of a site.
 pub(super) const IMAGES: Many = Many {
     further: &[&[
-        " Without a label or support data these are required: `sclk_start` or `utc_start`, `exposure_ms` or",
-        " `line_period_ms` (or for both of these `exposures`), `downtrack_summing`, `lines_header`, `samples`.",
+        " Without a label or support data, required keys are `sclk_start` or `utc_start`, `exposure_ms` or",
+        " `line_period_ms` (or `exposures` for all of these), `downtrack_summing`, `lines_header` and `samples`.",
     ]],
     ..Many::ANY
 };
 
 declare_table! {
-    /// Images, none to many: a label, the keys below, or both; keys written here win over the label. Or support data.
+    /// Images (optional): each has a label, keys for the image parameters, both, or support data. Keys written here
+    /// take precedence over the label.
     pub struct ImageConfig: Deserialize {
-        /// Identifier, unique in the site; also the name of a folder. One that begins with a product, such as `E02-02855`,
-        /// `m0402852_part` or `h5270_0000_ir2`, is for the label of that product only.
+        /// Identifier, unique in the site, and folder name. An identifier that begins with a product name, such as
+        /// `E02-02855`, `m0402852_part` or `h5270_0000_ir2`, is accepted only with the label of that product.
         id: String = key(identifier())
             .required()
             .example(r#""E02-02855""#)
             .example_in(1, r#""M04-02852""#),
-        /// PDS3 or ISIS label, attached or detached. For HRSC on Mars Express, the level-2 file of the archive
-        /// (`h….img`), whose rows contain the line times, with `instrument`; a label without its image also requires
-        /// `exposures`. If such a file has fewer samples than the detector has pixels, it requires `first_detector`:
-        /// ISIS and ALE assume pixel 0.
+        /// PDS3 or ISIS label, attached or detached. For HRSC on Mars Express: the level-2 file of the archive
+        /// (`h….img`), whose rows contain the line times, together with `instrument`; a label without its image also
+        /// requires `exposures`. An HRSC file with fewer samples than detector pixels requires `first_detector` (ISIS
+        /// and ALE assume pixel 0).
         #[serde(skip)]
         label: Option<PathBuf> = key(FILE).example(r#""../labels/e0202855.lbl""#),
-        /// The image itself (.imq, .img, .cub, TIFF, PNG), which may be the file of the label. The report shows
-        /// footprints and tie points on it, and with `ties.match` tie points are matched in it. A file without a label
-        /// must contain all lines. If two such files are matched, they must differ in size, which distinguishes them.
+        /// File with the pixels of the image (.imq, .img, .cub, TIFF, PNG), which may be the file of the label. The
+        /// report shows footprints and tie points on the image, and `ties.match` matches tie points in it. A file
+        /// without a label must contain all lines. Two files without labels must differ in size if they are matched:
+        /// the size distinguishes them.
         #[serde(skip)]
         pixels: Option<PathBuf> = key(FILE).unused(r#""../images/e0202855.imq""#),
-        /// Or image support data (ISD) of the Community Sensor Model, as ALE writes them: camera, line times and
-        /// orientation of a line scanner, without a label and without the keys below. The orientation is used
-        /// unchanged: pointing bias, `light_time` and the orbit and attitude kernels do not apply to such an image.
+        /// Alternatively, image support data (ISD) of the Community Sensor Model, as written by ALE: camera, line times
+        /// and orientation of a line scanner, in place of a label and of keys for these parameters. The orientation is
+        /// used unchanged: pointing bias, `light_time` and the orbit and attitude kernels do not apply to such an
+        /// image.
         #[serde(skip)]
         isd: Option<PathBuf> = key(FILE).unused(r#""../isd/m0402852.json""#),
-        /// Or an ISIS cube of a MOC image after `spiceinit`: its label and tables give line times, camera and
-        /// orientation, without orbit and attitude kernels, and without the keys below. Or a cube of a line scanner
-        /// after `csminit`, whose camera model state gives them. The orientation is used unchanged, as with support
-        /// data; it contains the pointing bias of ISIS. A cropped or reduced cube is the image of its own lines and
-        /// samples (group `AlphaCube`); for a map-projected cube the image before the projection is described; the
-        /// cube's pixels are not its samples. Pixels of an unprojected cube need its name in `pixels` as well.
+        /// Alternatively, an ISIS cube of a MOC image after `spiceinit`, whose label and tables give line times, camera
+        /// and orientation, or a cube of a line scanner after `csminit`, whose camera model state gives them. The cube
+        /// replaces orbit and attitude kernels, the label, and keys for these parameters. The orientation is used
+        /// unchanged, as with support data; it contains the pointing bias of ISIS. A cropped or reduced cube represents
+        /// the image of its own lines and samples (group `AlphaCube`). A map-projected cube represents the image before
+        /// the projection, whose samples are not the pixels of the cube. To use the pixels of an unprojected cube, name
+        /// the cube in `pixels` as well.
         #[serde(skip)]
         cube: Option<PathBuf> = key(FILE).unused(r#""../cubes/E0201461.cub""#),
-        /// Whether the laser is on the spacecraft of these support data, and their positions are geometric: these
-        /// positions are then used for the ranges of shots fired while the image was exposed. Only with support data.
+        /// Whether the spacecraft of the support data carries the laser, and the positions in the support data are
+        /// geometric. These positions are then used for the ranges of shots fired during the exposure of the image.
+        /// Only with support data.
         has_laser: bool = key(Switch).or(false).unused("true"),
-        /// The camera: `moc_na`, `moc_wa_red`, `moc_wa_blue`; a line of HRSC on Mars Express: `hrsc_nd`, `hrsc_s1`,
-        /// `hrsc_s2`, `hrsc_p1`, `hrsc_p2`, `hrsc_ir`, `hrsc_gr`, `hrsc_bl`, `hrsc_re`, required with its labels; or
-        /// the path of an instrument file like those in `config/instruments`. Without it, the MOC camera that the label
-        /// names, and without a label `moc_na`. Clock, orbit and attitude are those of its spacecraft.
+        /// Camera of the image: `moc_na`, `moc_wa_red`, `moc_wa_blue`; a line of HRSC on Mars Express (`hrsc_nd`,
+        /// `hrsc_s1`, `hrsc_s2`, `hrsc_p1`, `hrsc_p2`, `hrsc_ir`, `hrsc_gr`, `hrsc_bl`, `hrsc_re`), required with HRSC
+        /// labels; or the path of an instrument file as in `config/instruments`. The default is the MOC camera that the
+        /// label names or, without a label, `moc_na`. The spacecraft of the camera determines clock, orbit and
+        /// attitude.
         instrument: Option<Instrument> = key(CAMERA).example(r#""moc_na""#),
-        /// Name of the image in tie point files and in files for ISIS, if it is not the identifier: for a control
-        /// network the ISIS serial number, whose clock must be that of the image. Without it, the identifier.
+        /// Name of the image in tie point files and in files for ISIS; the default is the identifier. For a control
+        /// network: the ISIS serial number, whose clock reading must agree with the image.
         serial_number: Option<String> =
             key(text()).example(r#""MGS/651158134:116/MOC-NA""#),
-        /// Line times of an image whose exposure changes inside the image, as for HRSC: for every piece its first line,
-        /// counted from 0, the start of that line in ephemeris time (TDB seconds past J2000), and the line period in
-        /// milliseconds. ISIS stores them in the table `LineScanTimes` (lines counted from 1), ALE in `line_scan_rate`
-        /// (seconds from `center_ephemeris_time`). Requires `lines_header`; excludes `exposure_ms` and
-        /// `line_period_ms`. A separate start time must agree, and a gap of more than half a line between two pieces is
-        /// reported.
+        /// Line times of an image with changing exposure, as with HRSC. Each piece has its first line, counted from 0,
+        /// the start of that line in ephemeris time (TDB seconds past J2000), and the line period in milliseconds. ISIS
+        /// stores line times in the table `LineScanTimes` (lines counted from 1), ALE in `line_scan_rate` (seconds from
+        /// `center_ephemeris_time`). Requires `lines_header`; excludes `exposure_ms` and `line_period_ms`. A separate
+        /// start time must agree with the pieces, and a gap of more than half a line between two pieces is reported.
         exposures: Option<Vec<ExposurePiece>> = key(ExposureRows)
             .unused("[[0, 255744599.027482, 12.800791], [6665, 255744684.345045, 13.227428]]"),
         /// Keys written in the configuration.
@@ -119,16 +124,17 @@ impl ImageConfig {
 declare_table! {
     /// Parameters of an image in the configuration.
     fill ImageFields {
-        /// Spacecraft clock at the start of the first line, seconds:ticks with 256 ticks a second (":28" and ":028"
-        /// are both 28/256 s). Preferred: label UTC is rounded, with errors of 1.0 to 4.8 ms in five labels. A
-        /// difference of more than 20 ms is reported, of more than 1 s refused. Not for Mars Express, whose labels
-        /// contain counts that differ by seconds from its clock kernels.
+        /// Spacecraft clock at the start of the first line, seconds:ticks with 256 ticks per second (":28" and ":028"
+        /// are both 28/256 s). Preferred over UTC, which is rounded in labels, with errors of 1.0 to 4.8 ms in five
+        /// labels. A difference of more than 20 ms between clock and UTC is reported, and a difference of more than 1 s
+        /// is refused. Not for Mars Express, because clock readings in its labels differ by seconds from its clock
+        /// kernels.
         sclk_start = key(matching(
             CLOCK_STRING,
             "^(1/)?[0-9]+[:.][0-9]+$",
             is_clock_string,
         )).example_in(1, r#""619971158:028""#),
-        /// UTC at the start of the first line, used when there is no clock string.
+        /// UTC at the start of the first line, used without `sclk_start`.
         utc_start = key(matching(
             "UTC such as 1999-08-24T14:12:13.64 or 1999-236T14:12:13.64",
             "^[0-9]{4}-([0-9]{2}-[0-9]{2}|[0-9]{3})T[0-9]{2}:[0-9]{2}:[0-9]{2}([.][0-9]{1,9})?Z?$",
@@ -136,20 +142,20 @@ declare_table! {
         )).unused_in(1, r#""1999-08-24T14:12:13.64""#),
         /// Exposure of one detector line (`LINE_EXPOSURE_DURATION`).
         exposure_s as "exposure_ms" = milliseconds("0.4821"),
-        /// Time between two image lines: `exposure_ms` × `downtrack_summing`. One of the two is enough; both,
-        /// or one here and one in the label, must agree within the rounding of 0.0001 ms. The "Exposure Time"
-        /// of Shan et al. 2005, Table 2, is this.
+        /// Time between two image lines: `exposure_ms` × `downtrack_summing`. Either `exposure_ms` or `line_period_ms`
+        /// is sufficient; both, or one here and one in the label, must agree within the rounding of 0.0001 ms. The line
+        /// period is the "Exposure Time" of Shan et al. 2005, Table 2.
         line_period_s as "line_period_ms" = milliseconds("3.8568"),
-        /// Detector lines summed along the track (narrow angle: to 8).
+        /// Number of detector lines summed along the track (narrow angle: up to 8).
         downtrack_summing = key(SUMMING).example_in(1, "8"),
-        /// Detector pixels summed across the track.
+        /// Number of detector pixels summed across the track.
         crosstrack_summing = key(SUMMING).example_in(1, "8"),
-        /// Exposed lines, as in the image header; the time model counts these, less than 600 s in
-        /// all.
+        /// Number of exposed lines according to the image header, for the time model; the exposure of all lines takes
+        /// less than 600 s.
         lines_header = key(whole_from_to(IMAGE_LINES_MIN, LINES_MAX)).example_in(1, "1536"),
-        /// Lines in the delivered file, if fewer than were exposed.
+        /// Number of lines in the delivered file, if fewer than were exposed.
         lines_delivered = key(whole_from_to(1, LINES_MAX)).example_in(1, "1536"),
-        /// Samples per line.
+        /// Number of samples per line.
         samples = key(whole_from_to(1, DETECTORS_MAX)).example_in(1, "256"),
         /// First detector pixel, counted from 0 (`EDIT_MODE_ID`).
         first_detector = key(whole_from_to(0, DETECTORS_MAX - 1)).example_in(1, "0"),
@@ -237,7 +243,7 @@ fn of_spacecraft(image: &ImageConfig, keys: &mut Keys<'_, '_>) {
     let of = &spacecraft.full_name;
     if !spacecraft.labels_tell_clock {
         let expected = format!(
-            "utc_start or exposures instead: the clock in labels of {of} differs by seconds from its clock kernels"
+            "utc_start or exposures instead: clock readings in {of} labels differ by seconds from the clock kernels"
         );
         keys.refuse("sclk_start", expected);
     }
@@ -251,7 +257,7 @@ fn of_pieces(image: &ImageConfig, keys: &mut Keys<'_, '_>) {
     for key in ["exposure_ms", "line_period_ms"] {
         keys.refuse(
             key,
-            "no such key beside images.exposures, which state it for every piece",
+            "no such key: images.exposures states this quantity for every piece",
         );
     }
     // The values of a label are compared with them when it is read.
@@ -305,7 +311,9 @@ fn line_period(fields: &ImageFields, keys: &mut Keys<'_, '_>) {
         let expected_ms = exposure_s * f64::from(summing) / SECONDS_PER_MS;
         keys.refuse(
             "line_period_ms",
-            format!("exposure_ms × downtrack_summing = {expected_ms:.4}, or only one of them"),
+            format!(
+                "exposure_ms × downtrack_summing = {expected_ms:.4}, or only one of these keys"
+            ),
         );
     }
 }

@@ -60,7 +60,7 @@ fn all_of<T>(files: &[(&str, &str)], read: fn(&str, &Path) -> Result<T, Problems
 /// The content of a built-in file.
 #[expect(
     clippy::panic,
-    reason = "a program built with a bad file of its own; a test reads them all"
+    reason = "a program built with an invalid file; a test reads all built-in files"
 )]
 fn of_the_program<T>(read: Result<T, Problems>) -> T {
     read.unwrap_or_else(|problems| panic!("built with an invalid file: {problems}"))
@@ -237,7 +237,7 @@ fn naif(
     let of_spacecraft = names.bus == spacecraft.bus && names.bus_frame == spacecraft.bus_frame;
     if !of_spacecraft && !review.has_problems() {
         let text = format!(
-            "naif.bus is {} and naif.bus_frame {}; expected {} and {}, those of {} (key spacecraft)",
+            "naif.bus is {} and naif.bus_frame is {}; expected {} and {} for {} (key spacecraft)",
             names.bus, names.bus_frame, spacecraft.bus, spacecraft.bus_frame, spacecraft.full_name
         );
         review.problem(None, text);
@@ -257,10 +257,10 @@ fn ck_bias_s(
         let expected = if max_s > 0.0 {
             format!("at most {max_s}")
         } else {
-            "0: its attitude kernels need no time correction".to_owned()
+            "0: the attitude kernels need no time correction".to_owned()
         };
         let text = format!(
-            "pointing.ck_bias_s is {bias_s} of a camera on {}; expected {expected}",
+            "pointing.ck_bias_s is {bias_s} for a camera on {}; expected {expected}",
             spacecraft.full_name
         );
         review.problem(None, text);

@@ -34,12 +34,12 @@ declare_table! {
         /// The source of the kernel list.
         #[serde(skip)]
         source: KernelSource = group::<SourceKeys>().map(SourceKeys::source),
-        /// Tolerance of attitude look-ups; 0 permits look-ups only inside the intervals of the C-kernel, so that gaps
-        /// are reported. (The ISIS addendum for MOC uses 1 s.) Beyond the intervals the nearest attitude is used
-        /// although the bus rotates: this is noted, and invalid beyond 4 s.
+        /// Tolerance of attitude look-ups outside the intervals of the C-kernel; with 0, gaps are reported. (The ISIS
+        /// addendum for MOC uses 1 s.) Within the tolerance, the nearest attitude is used although the bus rotates:
+        /// extrapolation is reported, and is invalid beyond 4 s.
         ck_tolerance_s: f64 = key(from_to(0.0, 60.0)).or(0.0),
-        /// Margin that kernel coverage must have beyond the first and last instant used. The default is more than the
-        /// rounding of label times (10 ms) and clock ticks (4 ms), well below the 4 s between attitude samples, so that
+        /// Required margin of kernel coverage before the first and after the last instant used. The default exceeds the
+        /// rounding of label times (10 ms) and clock ticks (4 ms), but is well below the 4 s between attitude samples:
         /// no image that the kernels can orient is refused.
         padding_s: f64 = key(from_to(0.0, 3600.0)).or(1.0),
     }
@@ -48,29 +48,29 @@ declare_table! {
 declare_table! {
     /// The source of the kernel list.
     struct SourceKeys {
-        /// A SPICE metakernel; relative paths in it are relative to its folder.
+        /// SPICE metakernel; relative paths in this file are relative to its folder.
         metakernel: Option<PathBuf> = key(FILE).example(r#""../kernels/scene.tm""#),
-        /// Or kernels in load order, plain paths without wildcards; later ones win.
+        /// Alternatively, kernels in load order, as plain paths without wildcards; later kernels take precedence.
         files: Option<Vec<PathBuf>> = key(list(FILE).each_once("each kernel once"))
             .unused(r#"["../kernels/naif0012.tls", "../kernels/mgs_ext1.bsp"]"#),
-        /// Or a folder, searched with its subfolders; the three keys that follow then apply too.
+        /// Alternatively, a folder, searched with its subfolders; `spk_family`, `ck_quality` and `pinned` then apply.
         root: Option<PathBuf> = key(FOLDER).unused(r#""../kernels""#),
         /// Or rival sets, each complete with the same clocks.
         sets: Option<Vec<RivalKernels>> = tables(SETS).then(|sets, keys: &mut Keys<'_, '_>| {
             keys.span_of("sets").is_some().then_some(sets)
         }),
-        /// Orbit solution: "nav" (MGS navigation team, recommended by NAIF and used by Shan et al. 2005),
-        /// "gsfc", "ipng"; they differ by 0 to 50 m, mostly across the track. With `root`.
+        /// Orbit solution: "nav" (MGS navigation team, recommended by NAIF and used by Shan et al. 2005), "gsfc" or
+        /// "ipng"; the solutions differ by 0 to 50 m, mostly across the track. With `root`.
         spk_family: String = key(lower_case_identifier()).or("nav".to_owned()).unused(r#""nav""#),
-        /// Attitude that may be used, best first: "reconstructed" is telemetry, "nominal" the commanded attitude
-        /// that fills its gaps. With `root`.
+        /// Permitted kinds of attitude, best first: "reconstructed" is from telemetry, and "nominal" is the commanded
+        /// attitude, which fills gaps in telemetry. With `root`.
         ck_quality: Vec<CkQuality> = key(list(words([
             ("reconstructed", CkQuality::Reconstructed, ""),
             ("nominal", CkQuality::Nominal, ""),
         ])).each_once("each quality once"))
             .or(vec![CkQuality::Reconstructed, CkQuality::Nominal])
             .unused(r#"["reconstructed", "nominal"]"#),
-        /// Kernels fixed by file name; of others the latest version is taken. With `root`.
+        /// Kernels pinned by file name; the latest version of other kernels is used. With `root`.
         pinned: Vec<String> = key(list_or_none(matching(
             "file names without folders",
             r"^[^/\\]+$",
@@ -129,10 +129,10 @@ fn listed(metakernel: Option<PathBuf>, files: Option<Vec<PathBuf>>) -> KernelLis
 }
 
 declare_table! {
-    /// Or 2 to 16 rival sets instead of the source above, each complete with the same clocks: the set whose trajectory
-    /// is closest to the mean of all (root mean square distance over the positions that the site needs) is used, as in
-    /// Shan et al. 2005; the manifest states the distances. Two sets are equally far from their mean: the first is
-    /// used. Each has either `metakernel` or `files`.
+    /// Alternatively, 2 to 16 rival sets with the same clocks, each complete and given by either `metakernel` or
+    /// `files`. As in Shan et al. 2005, the set whose trajectory is closest to the mean of all sets is used (root mean
+    /// square distance over the positions that the site needs); the manifest states the distances. Two sets are equally
+    /// far from their mean; the first is then used.
     fill RivalKernels {
         /// Identifier, unique in the site.
         id = key(lower_case_identifier()).required().unused(r#""nav""#).unused_in(1, r#""ipng""#),
@@ -144,9 +144,9 @@ declare_table! {
 declare_table! {
     /// Kernels of a set.
     struct ListKeys {
-        /// A SPICE metakernel; relative paths in it are relative to its folder.
+        /// SPICE metakernel; relative paths in this file are relative to its folder.
         metakernel: Option<PathBuf> = key(FILE).unused(r#""../kernels/nav.tm""#),
-        /// Or kernels in load order, plain paths without wildcards; later ones win.
+        /// Alternatively, kernels in load order, as plain paths without wildcards; later kernels take precedence.
         files: Option<Vec<PathBuf>> = key(list(FILE).each_once("each kernel once"))
             .unused_in(1, r#"["../kernels/naif0012.tls", "../kernels/mgs_ipng.bsp"]"#),
     }

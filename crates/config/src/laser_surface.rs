@@ -11,22 +11,22 @@ use super::{
 };
 
 declare_table! {
-    /// The ground between the shots of all profiles, with which heights of tie points are compared and, in the
-    /// default adjustment, controlled.
+    /// Laser surface: the ground between the shots of all profiles. It is compared with the heights of tie points and,
+    /// in the default adjustment, controls them.
     pub struct MolaSurfaceConfig: Deserialize {
         /// Standard deviation of the height of a shot.
         shot_sigma_m: f64 = key(from_to(0.01, 1e4)).or(SurfaceOptions::default().shot_sigma_m),
-        /// Radial error that all shots of a profile share (1 m after crossovers, Neumann et al. 2001).
+        /// Standard deviation of the radial error shared by all shots of a profile (1 m after crossover correction,
+        /// Neumann et al. 2001).
         profile_sigma_m: f64 = key(zero_or(1e-3, 1e4)).or(SurfaceOptions::default().profile_sigma_m),
-        /// Error in plan between images and shots, shared by all tie points; on a slope it becomes a height error. The
-        /// default combines 110 m of the images and 70 m of MOLA.
+        /// Standard deviation of the plan error between images and shots, shared by all tie points; on slopes, this
+        /// error becomes a height error. The default combines 110 m for the images and 70 m for MOLA.
         plan_sigma_m: f64 = key(zero_or(1e-3, 1e5)).or(SurfaceOptions::default().plan_sigma_m),
-        /// Standard deviation of the position of a profile in plan, per axis (MOLA's 100 m in the horizontal, Neumann
-        /// et al. 2001). Stated accuracies of footprints contain it; it weighs profiles where `adjustment.relief_for_plan`
-        /// or `adjustment.common_bus` is "yes".
+        /// Standard deviation of the plan position of a profile, per axis (100 m horizontally for MOLA, Neumann et al.
+        /// 2001). The stated accuracies of footprints include this value, which also weights profiles where
+        /// `adjustment.relief_for_plan` or `adjustment.common_bus` is "yes".
         profile_plan_sigma_m: f64 = key(from_to(1e-3, 1e5)).or(70.0),
-        /// Least roughness: root mean square difference of heights 300 m apart. Larger values are estimated from the
-        /// shots.
+        /// Lower limit of the roughness estimated from the shots: root mean square difference of heights 300 m apart.
         roughness_min_m: f64 = key(from_to(0.01, 1e4)).or(SurfaceOptions::default().roughness_min_m),
     }
 }

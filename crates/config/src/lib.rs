@@ -172,7 +172,7 @@ pub fn keys() -> Vec<DeclaredKey> {
 /// Two configurations name the same site, so their products would overwrite each other.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, Cause)]
 #[error("site is \"{site}\" in {first} and in {second}; expected one file per site")]
-#[cause(Configuration: "give each site its own identifier: it is also the folder of its products")]
+#[cause(Configuration: "give each site its own identifier, which is also the name of its products folder")]
 pub struct DuplicateSite {
     /// The identifier they share.
     pub site: String,

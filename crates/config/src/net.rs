@@ -18,7 +18,7 @@ declare_table! {
     /// Everything that `areograph triangulate` needs to know about a net: every value checked, metres and radians
     /// inside.
     pub struct NetConfig {
-        /// Identifier, and the name of the folder of its products.
+        /// Identifier of the net, and name of its products folder.
         net: String = key(lower_case_identifier()).required().example(r#""tertiary""#),
         /// Free text for the report.
         description: String = key(any_text()).or(String::new())
@@ -48,16 +48,16 @@ declare_table! {
 impl Document for NetConfig {
     const EXAMPLE: &'static str = "config/nets/example.toml";
     const HEADER: &'static str = "\
-# A net of rectified pictures for `areograph triangulate`, every key with its unit, range and default.
+# Net of rectified pictures for `areograph triangulate`: every key with its unit, range and default.
 #
-# Only `net`, [measurements] and [controls] are required; a key that is left out has the default given
-# here. Relative paths are relative to the folder of this file. Schema: ../schema/net.schema.json
+# Only `net`, [measurements] and [controls] are required; an omitted key has the default given here.
+# Relative paths are relative to the folder of this file. Schema: ../schema/net.schema.json
 
 ";
     const SCHEMA: [&'static str; 2] = [
-        "Net of rectified pictures of areograph",
-        "The TOML file of one net as JSON. areograph checks more than a schema can: existence of files, agreement \
-         between keys.",
+        "Net of rectified pictures for areograph",
+        "The TOML file of one net as JSON. areograph checks more than a schema can: the existence of files and the \
+         agreement between keys.",
     ];
 
     fn with_file(self, file: PathBuf, blake3: String, keys: BTreeMap<String, String>) -> Self {
@@ -86,10 +86,9 @@ fn across_tables(net: &NetConfig, keys: &mut Keys<'_, '_>) {
 declare_table! {
     /// Points in pictures.
     pub struct MeasurementsConfig {
-        /// Paths or globs of tables (.csv), one row per measurement: `picture`, `point`, `x`, `y`, y upwards as on a
-        /// map (inverted where it counts lines downwards). A crater boxed by two settings of a cross has
-        /// `x_upper_right`, `y_upper_right`, `x_lower_left`, `y_lower_left` instead of `x`, `y`. Units are the
-        /// picture's own.
+        /// Paths or globs of tables (.csv), one row per measurement: `picture`, `point`, `x`, `y`; y increases upwards
+        /// as on a map, unless `y_axis` is "down". A crater enclosed by two settings of a cross has `x_upper_right`,
+        /// `y_upper_right`, `x_lower_left`, `y_lower_left` instead of `x`, `y`. Each picture may have its own units.
         #[serde(skip)]
         files: Vec<PathBuf> = key(Globs)
             .required_as("paths or globs of tables of measurements")
@@ -97,7 +96,7 @@ declare_table! {
         /// Direction of y in all pictures.
         y_axis: YAxis = key(words([
             ("up", YAxis::Up, "as on a map"),
-            ("down", YAxis::Down, "as lines of an image"),
+            ("down", YAxis::Down, "like image lines"),
         ])).or(YAxis::Up),
     }
 }
@@ -115,47 +114,47 @@ pub enum YAxis {
 declare_table! {
     /// Points with known positions.
     pub struct ControlsConfig {
-        /// Paths or globs of tables (.csv), one row per control: `point` and `x_m`, `y_m` or `x_km`, `y_km` on the
-        /// map, or `longitude_deg` (east), `latitude_deg` (areocentric); `sigma_m` or `sigma_km` for a control with
-        /// an individual standard deviation.
+        /// Paths or globs of tables (.csv), one row per control: `point` with map coordinates (`x_m`, `y_m` or `x_km`,
+        /// `y_km`) or with `longitude_deg` (east) and `latitude_deg` (areocentric); `sigma_m` or `sigma_km` for a
+        /// control with an individual standard deviation.
         #[serde(skip)]
         files: Vec<PathBuf> = key(Globs)
             .required_as("paths or globs of tables of controls")
             .example(r#"["controls.csv"]"#),
-        /// Standard deviation of a coordinate of a control, its measurement included, where the table has none.
-        /// Without it, estimated from the residuals of SCALE at the controls.
+        /// Standard deviation of a control coordinate, including its measurement, if missing from the table. Without
+        /// this key, it is estimated from the residuals of SCALE at the controls.
         sigma_m: Option<f64> = key(above_to(0.0, 1e7)).unused("2000.0"),
-        /// Residual, in standard deviations of SCALE, beyond which a control is rejected. Two gross errors that mask
-        /// each other are found too, by least median of squares; fewer than five controls cannot be tested.
+        /// Residual, in standard deviations of SCALE, beyond which a control is rejected. Two blunders that mask each
+        /// other are also detected, by least median of squares; fewer than five controls cannot be tested.
         limit: f64 = key(from_to(2.5, 1e6)).or(4.0),
     }
 }
 
 declare_table! {
-    /// A priori data of the pictures. Without this table the pictures are those of the measurements.
+    /// A priori data of the pictures. Without this table, the measurements define the pictures.
     pub struct PicturesConfig {
-        /// Paths or globs of tables (.csv), one row per picture: `picture`, and where known `brick`, the name of its
-        /// brick, and `metres_per_unit`, the size of a unit of its coordinates on the ground, which tests the scale of
-        /// the controls: where the adjusted size differs by more than 2 %, the net is invalid.
+        /// Paths or globs of tables (.csv), one row per picture: `picture` and, where known, `brick` (name of the
+        /// brick) and `metres_per_unit` (size of a coordinate unit on the ground). The size tests the scale of the
+        /// controls: if the adjusted size differs by more than 2 %, the net is invalid.
         #[serde(skip)]
         files: Vec<PathBuf> = key(Globs).or(Vec::new()).unused(r#"["pictures.csv"]"#),
     }
 }
 
 declare_table! {
-    /// Corrections of the film, before anything else.
+    /// Film corrections, applied before all other steps.
     pub struct FilmConfig {
         /// Paths or globs of tables (.csv) of ticks, one row per tick: `picture`, `tick`, measured `x`, `y`, known
-        /// `known_x`, `known_y`. The ticks `upper_left`, `upper_right`, `lower_left` and `lower_right` give linear
-        /// double interpolation (drum scanners); with `upper`, `lower`, `left` and `right`, the middles of the edges,
-        /// a quadratic that is 0 at the corners is added (cathode-ray recorders).
+        /// `known_x`, `known_y`. The ticks `upper_left`, `upper_right`, `lower_left` and `lower_right` permit linear
+        /// double interpolation (drum scanners). With `upper`, `lower`, `left` and `right`, the middles of the edges, a
+        /// quadratic term that is 0 at the corners is added (cathode-ray recorders).
         #[serde(skip)]
         files: Vec<PathBuf> = key(Globs).or(Vec::new()).unused(r#"["ticks.csv"]"#),
     }
 }
 
 declare_table! {
-    /// The map: a conformal projection of a sphere, in which pictures fit by similarities.
+    /// Map: pictures are fitted by similarities to a conformal projection of a sphere.
     pub struct MapConfig {
         /// The projection.
         map: ConformalMap = group::<MapKeys>().map(MapKeys::map),
@@ -163,17 +162,17 @@ declare_table! {
 }
 
 declare_table! {
-    /// The map: a conformal projection of a sphere, in which pictures fit by similarities.
+    /// Map: pictures are fitted by similarities to a conformal projection of a sphere.
     struct MapKeys {
         /// The projection.
         projection: Projection = key(words([
-            ("mercator", Projection::Mercator, "as in the paper; away from the poles"),
-            ("stereographic", Projection::Stereographic, "about any place"),
+            ("mercator", Projection::Mercator, "as in Arthur & McMacken 1977; away from the poles"),
+            ("stereographic", Projection::Stereographic, "centred on any point"),
         ])).or(Projection::Mercator),
-        /// East longitude of the central meridian, or of the centre.
+        /// East longitude of the central meridian (Mercator) or of the projection centre (stereographic).
         longitude_rad as "longitude_deg": f64 =
             key(from_to(-180.0, 360.0)).or(0.0).map(|degrees| degrees * RADIANS_PER_DEGREE),
-        /// Areocentric latitude at which Mercator's scale is true, or of the centre.
+        /// Areocentric latitude of true scale (Mercator) or of the projection centre (stereographic).
         latitude_rad as "latitude_deg": f64 =
             key(from_to(-90.0, 90.0)).or(0.0).map(|degrees| degrees * RADIANS_PER_DEGREE),
         /// Radius of the sphere. The default is the equatorial radius of the IAU 2000 ellipsoid.
@@ -203,26 +202,26 @@ fn mercator_has_an_equator(map: &MapKeys, keys: &mut Keys<'_, '_>) {
 }
 
 declare_table! {
-    /// Solution of the net. The programs are those of Arthur & McMacken 1977.
+    /// Solution of the net, with the programs of Arthur & McMacken 1977.
     pub struct TriangulationConfig {
         /// Method that positions the pictures on the map.
         method: Method = key(words([
             ("scale", Method::Scale, "BRICK, EXTEND, SCALE: bricks keep their shapes, which may be bent where ties are few"),
-            ("mortar", Method::Mortar, "BRICK, EXTEND, MORTAR, SCALE: bricks adapt to the controls by their weights"),
-            ("one_shot", Method::OneShot, "all pictures and controls at once, by their weights"),
+            ("mortar", Method::Mortar, "BRICK, EXTEND, MORTAR, SCALE: weighted adaptation of bricks to the controls"),
+            ("one_shot", Method::OneShot, "weighted adjustment of all pictures and controls at once"),
         ])).or(Method::OneShot),
-        /// LOCAL: evens out the seams between bricks afterwards.
-        local: bool = key(yes_or_no("seams remain unchanged", "pictures of a brick adapt to its neighbours")).or(false),
-        /// Pictures of a brick, where the table of pictures names no bricks.
+        /// Whether LOCAL evens out the seams between bricks afterwards.
+        local: bool = key(yes_or_no("seams remain unchanged", "pictures of a brick adapt to neighbouring bricks")).or(false),
+        /// Number of pictures in a brick, if the table of pictures names no bricks.
         brick_pictures: u32 = key(whole_from_to(2, 100)).or(8),
-        /// Blunders: measurements whose standardised deviation, in the adjustment of the whole net, is larger than the
-        /// largest by chance in one net of a hundred.
+        /// Treatment of blunders: measurements whose standardised deviation in the adjustment of the whole net exceeds
+        /// the largest value expected by chance in one of a hundred nets.
         blunders: Blunders = key(words([
-            ("remove", Blunders::Remove, "leave them out and report them"),
-            ("report", Blunders::Report, "flag them and use them"),
+            ("remove", Blunders::Remove, "rejected and reported"),
+            ("report", Blunders::Report, "flagged and used"),
         ])).or(Blunders::Remove),
-        /// Standard deviation of a coordinate of a measurement on the map. If missing, it is estimated from the deviations
-        /// in bricks.
+        /// Standard deviation of a measured coordinate on the map. If missing, it is estimated from the deviations in
+        /// bricks.
         tie_sigma_m: Option<f64> = key(above_to(0.0, 1e7)).unused("50.0"),
     }
     check seams_need_bricks

@@ -12,8 +12,8 @@ use super::keys;
 
 /// Beginning of such a file.
 const HEADER: &str = "\
-# Written by `areograph init`. Keys that are left out have their defaults; relative paths are relative to its folder.
-# `areograph check` reports everything that would stop a run.
+# Written by `areograph init`. Omitted keys have their defaults; relative paths are relative to the folder of this file.
+# `areograph check` reports everything that would prevent a run.
 
 ";
 /// Margin of a window beyond the image that it is named after, kilometres.

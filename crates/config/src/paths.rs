@@ -130,8 +130,7 @@ impl Form for Globs {
                         // Access is tested without opening: a file that did not change is not opened.
                         if let Err(error) = access(&path, Access::READ_OK) {
                             let error = io::Error::from(error);
-                            let expected =
-                                format!("files that can be read: {}: {error}", path.display());
+                            let expected = format!("readable files; {}: {error}", path.display());
                             review.refuse(span, &found.key, expected);
                             break;
                         }
@@ -222,7 +221,7 @@ fn matches(folder: &Path, glob: &str) -> Result<Vec<PathBuf>, Unmatched> {
     for entry in found.take(FILES_MAX + 1) {
         let path = entry.map_err(|error| {
             format!(
-                "folders that can be read: {}: {}",
+                "readable folders; {}: {}",
                 error.path().display(),
                 error.error()
             )
@@ -233,7 +232,7 @@ fn matches(folder: &Path, glob: &str) -> Result<Vec<PathBuf>, Unmatched> {
             // A skipped file would remain undetected.
             Err(error) => {
                 return Err(Unmatched::Other(format!(
-                    "existing files: {} cannot be accessed: {error}",
+                    "existing files; {} cannot be accessed: {error}",
                     path.display()
                 )));
             }

@@ -17,26 +17,26 @@ use super::{
 };
 
 declare_table! {
-    /// PEDR files. Without this table images are oriented, but there are no footprints and no range check.
+    /// PEDR files. Without this table, images are oriented, but there are no footprints and no range check.
     pub struct PedrConfig: Deserialize {
-        /// PEDR files: paths or globs with `*`, `?`, `[..]`, in at most three parts of the path; `**` is not accepted;
-        /// letter case counts. A glob that matches no file is a problem. Every shot counts once: a copy of a file is
-        /// read once, two versions of one orbit are refused.
+        /// Paths or globs of PEDR files, with `*`, `?`, `[..]` in at most three parts of the path; `**` is not
+        /// accepted, and letter case is significant. A glob that matches no file is refused. Every shot is counted
+        /// once: a copy of a file is read once, and two versions of one orbit are refused.
         #[serde(skip)]
         files: Vec<PathBuf> = key(Globs)
             .required_as("paths or globs of PEDR files (or no table [pedr] at all)")
             .example(r#"["../pedr/*.b"]"#),
-        /// Datum of their coordinates; a stated one must not contradict version letter or label. IAU 1991 and 1994
-        /// differ by 0.033 degrees of longitude, 1.96 km at the equator; pck00006, which Shan et al. 2005 call IAU
-        /// 1991, holds the 1994 constants.
+        /// Datum of the coordinates in the files; a stated datum must not contradict the version letter or the label.
+        /// IAU 1991 and IAU 1994 differ by 0.033 degrees of longitude, 1.96 km at the equator; pck00006, which Shan et
+        /// al. 2005 call IAU 1991, contains the 1994 constants.
         datum: DatumChoice = key(words([
-            ("auto", DatumChoice::Auto, "from version letter and label: L is IAU 2000, older versions IAU 1991"),
+            ("auto", DatumChoice::Auto, "from the version letter and the label: L is IAU 2000, and older versions are IAU 1991"),
             ("iau1991", DatumChoice::Stated(Datum::Iau1991), ""),
             ("iau1994", DatumChoice::Stated(Datum::Iau1994), ""),
             ("iau2000", DatumChoice::Stated(Datum::Iau2000), ""),
         ])).or(DatumChoice::Auto),
-        /// Radius that every stage takes for the ground: corrected by the crossover residuals of the files (as in Shan,
-        /// Lee & Yoon 2002), or raw. The range check reports both; tables of shots have one radius.
+        /// Shot radius that every stage uses as the radius of the ground: corrected by the crossover residuals of the
+        /// files (as in Shan, Lee & Yoon 2002), or raw. The range check reports both; tables of shots have one radius.
         crossover: GroundRadius = key(ground_radius()).or(GroundRadius::Corrected),
         /// Shots to keep.
         filter: ShotFilter = table(),
@@ -44,19 +44,20 @@ declare_table! {
 }
 
 declare_table! {
-    /// Shots to keep; a shot must pass every test.
+    /// Selection of shots; a shot must pass every test.
     fill ShotFilter {
-        /// Classification codes: 1 ground, 0 cloud or noise. The default is that of pedr2tab.
+        /// Accepted classification codes: 1 is ground, and 0 is cloud or noise. The default is from pedr2tab.
         classes = key(list(whole_from_to(i16::MIN, i16::MAX))).or(vec![1]).map(sorted),
-        /// Trigger channels. (The MOLA team's grids leave out channel 4.)
+        /// Accepted trigger channels. (The grids of the MOLA team exclude channel 4.)
         channels = key(list(whole_from_to(ShotFilter::CHANNELS[0], ShotFilter::CHANNELS[1]))).or(vec![1, 2, 3, 4]).map(sorted),
-        /// Attitude flags. With 2 (attitude missing for part of the frame) and 3 (for all of it) the footprint
-        /// assumes nadir pointing, which off nadir can be 100 km wrong; the surface counts such profiles as four times as
-        /// uncertain. 1 has no published meaning; in files
-        /// before 1998-10 the field is undefined: there, list the values found.
+        /// Accepted attitude flags. With flag 2 (attitude missing for part of the frame) or 3 (for the whole frame),
+        /// the footprint assumes nadir pointing and may be 100 km in error off nadir; the MOLA surface treats these
+        /// profiles as four times as uncertain. Flag 1 has no published meaning. In files before 1998-10 the field is
+        /// undefined: list the values found in these files.
         attitude_flags = key(list(whole_from_to(u16::MIN, u16::MAX))).or(vec![0, 1]).map(sorted),
-        /// Largest off-nadir angle of the laser. The default keeps all, because images are taken off nadir too: Shan
-        /// et al. 2005, Table 2, has emission angles of up to 22.1 degrees. (The MOLA team's grids stop at 1.0 or 1.2.)
+        /// Largest off-nadir angle of the laser. The default keeps all shots, because images are also taken off nadir:
+        /// Shan et al. 2005, Table 2, list emission angles of up to 22.1 degrees. (The grids of the MOLA team are
+        /// limited to 1.0 or 1.2.)
         off_nadir_max_rad as "off_nadir_max_deg" =
             key(above_to(0.0, ShotFilter::OFF_NADIR_LIMIT_DEG)).or(90.0).map(|degrees| degrees * RADIANS_PER_DEGREE),
         /// First and last areocentric longitude of the Sun: the season of Mars, 0 at the northward equinox; if the
@@ -72,7 +73,7 @@ pub(super) const fn ground_radius() -> Words<GroundRadius, 2> {
         (
             GroundRadius::Corrected.word(),
             GroundRadius::Corrected,
-            "where the file has a residual",
+            "where the file contains a crossover residual",
         ),
         (GroundRadius::Raw.word(), GroundRadius::Raw, ""),
     ])

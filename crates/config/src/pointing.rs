@@ -23,19 +23,19 @@ const KNOWN_S: f64 = 0.0005;
 const NADIR_TURN_M_S: f64 = 330.0;
 
 declare_table! {
-    /// Pointing bias, if it differs from the biases of the cameras. Every instrument file contains the bias of its
-    /// camera and its source; a value here applies to all images of the site instead.
+    /// Pointing bias, if different from the biases of the cameras. Every instrument file contains the bias of the
+    /// camera, with a citation; a value here replaces these biases for all images of the site.
     pub struct PointingConfig: Deserialize {
         /// Time correction of attitude kernels: the attitude of an exposure at t is read at t + `ck_bias_s`. Position,
-        /// Mars rotation and mounting stay at t. Without this key, the bias of the instrument file. Known: value and
-        /// sign for MOC, from ISIS and ALE (`INS-94031_CK_TIME_BIAS`) and Shan et al. 2005. The known value with its
-        /// sign reversed is refused; any other value is reported in a remark. Unknown: whether the same value holds for
+        /// Mars rotation and mounting refer to t. The default is the bias in the instrument file. For MOC, value and
+        /// sign are known from ISIS, ALE (`INS-94031_CK_TIME_BIAS`) and Shan et al. 2005. The known value with reversed
+        /// sign is refused; any other value is reported in a remark. It is unknown whether the same value applies to
         /// kernels before the mapping phase (before April 1999).
         ck_bias as "ck_bias_s": Option<PointingBias> = key(from_to(-10.0, 10.0))
             .unused("-1.15")
             .map(|bias_s| bias_s.map(PointingBias::from_seconds)),
-        /// Citation that products repeat; change it together with the value. Without it, the citation of the instrument
-        /// file, or for a different bias the name of the key `ck_bias_s`.
+        /// Citation in the products; change it together with `ck_bias_s`. The default is the citation in the instrument
+        /// file or, for a different bias, the name of the key `ck_bias_s`.
         source: Option<String> = key(text()).unused(r#""mocAddendum004.ti; Shan et al. 2005, p. 98""#),
     }
 }
@@ -114,8 +114,8 @@ impl PointingConfig {
         let apart_s = self.departure_s(camera);
         (apart_s > KNOWN_S).then(|| {
             format!(
-                "pointing.ck_bias_s is {bias_s} s, the known bias of {} {known_s} s: the difference of {apart_s:.3} s \
-                 is up to {:.0} m on the ground",
+                "pointing.ck_bias_s is {bias_s} s, but the known bias of {} is {known_s} s: the difference of \
+                 {apart_s:.3} s corresponds to up to {:.0} m on the ground",
                 camera.name,
                 apart_s * NADIR_TURN_M_S
             )
@@ -124,35 +124,36 @@ impl PointingConfig {
 }
 
 declare_table! {
-    /// Clock bias of MOLA.
-    /// Known: Shan et al. 2005 (data preparation, citing NAIF 2001) corrected it. Unknown: its sign, and whether PEDR
-    /// time tags, of which versions, already include it. The defaults below are therefore a choice; the
-    /// bias scan of the range check shows which one a profile supports. Size: about one shot spacing
-    /// (353 to 398 m) along the track, 28 m of Mars rotation at the equator, at most 3.2 m of height.
+    /// Clock bias of MOLA. Shan et al. 2005 (data preparation, citing NAIF 2001) corrected this bias. Its sign is
+    /// unknown, as are the versions of PEDR time tags (if any) that already include the bias. The defaults are
+    /// therefore a choice of areograph; the bias scan of the range check shows which choice a profile supports. The
+    /// effect is about one shot spacing (353 to 398 m) along the track, 28 m of Mars rotation at the equator, and at
+    /// most 3.2 m in height.
     fill MolaClock {
-        /// Size of the bias. Without it, the bias of the altimeter file.
+        /// Size of the clock bias; the default is the bias in the altimeter file.
         bias_s = key(from_to(0.0, 10.0)).or(usual_altimeter().clock_bias_s),
-        /// Side of the true time on which a tag lies.
+        /// Sign of the clock bias: time tags are later or earlier than the true time.
         sign = key(words([
             ("late", TagSign::Late, "true time = tag - bias"),
             ("early", TagSign::Early, "true time = tag + bias"),
         ])).or(TagSign::Late),
-        /// Use of the corrected time. Shan et al. 2005 correct the bias in the datum conversion, and look the
-        /// spacecraft up at the corrected time; they give no formula. Three readings: one corrected time serves both
-        /// rotations and the look-up, then footprints stay (0.3 mm) and only the look-up changes ("spk_lookup", a
-        /// choice of areograph); the rotation into IAU 2000 uses it and the rotation out of the file's datum does not
-        /// ("both", 28 m); the rotation alone ("rotation") contradicts their look-up.
+        /// Use of the corrected time. Shan et al. 2005 correct the bias in the datum conversion and look up the
+        /// spacecraft at the corrected time, but give no formula. Three readings are possible. If the corrected time
+        /// applies to both rotations and the look-up, footprints remain unchanged (0.3 mm), and only the look-up
+        /// changes ("spk_lookup", a choice of areograph). If this time applies to the look-up and the rotation into IAU
+        /// 2000, but not to the rotation from the file's datum, footprints move by 28 m ("both"). Application to the
+        /// rotation alone ("rotation") contradicts the look-up of Shan et al. 2005.
         scope = key(words([
             ("spk_lookup", BiasScope::SpkLookup, "the spacecraft's position in the range check"),
             (
                 "rotation",
                 BiasScope::Rotation,
-                "the rotation into IAU 2000 (the rotation out of the file's datum stays at the tag)",
+                "the rotation into IAU 2000 (the rotation from the file's datum remains at the time tag)",
             ),
             ("both", BiasScope::Both, "both"),
-            ("none", BiasScope::None, "nothing: tags are used unchanged"),
+            ("none", BiasScope::None, "nothing: time tags are used unchanged"),
         ])).or(BiasScope::SpkLookup),
-        /// Citation that products repeat; change it together with the values.
+        /// Citation in the products; change it together with the values.
         source = key(text()).or(usual_altimeter().clock_source.clone()),
     }
     check bias_is_used

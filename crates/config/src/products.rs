@@ -45,10 +45,10 @@ impl ShotFormat {
 }
 
 declare_table! {
-    /// Products that only some users need.
+    /// Optional products.
     pub struct ProductsConfig: Deserialize {
-        /// Formats of the footprints beside `footprints.parquet`, which every site has: each takes more time and disk
-        /// space. `areograph export` writes the same files from the products at any time.
+        /// Footprint formats in addition to `footprints.parquet`, which every site has; each format requires additional
+        /// time and disk space. `areograph export` writes the same files from the products at any time.
         formats: Vec<ShotFormat> = key(list_or_none(words_of(
             ShotFormat::WORDS,
             [

@@ -12,32 +12,33 @@ use super::{
 pub const SCAN_STEPS_MAX: u32 = 10_000;
 
 declare_table! {
-    /// Limits that make a profile valid or invalid.
+    /// Limits that decide whether a profile is valid.
     pub struct RangeCheckConfig: Deserialize, JsonSchema {
         /// Largest |mean| of range minus distance. The default is a choice of areograph: Shan et al. 2005 state no
-        /// limit; the profiles of their Table 3 reach 2 m at nadir and 25.4 m off nadir. Off nadir, `orbit_max_m` times
-        /// the sine of the angle is added.
+        /// limit, and the profiles in their Table 3 reach 2 m at nadir and 25.4 m off nadir. Off nadir, `orbit_max_m`
+        /// times the sine of the off-nadir angle is added.
         mean_max_m: f64 = key(above_to(0.0, 1e6)).or(10.0),
-        /// A shot farther from the median than this many robust standard deviations is an outlier. The default is a
-        /// choice of areograph; Shan et al. 2005 mention single shots about 5 standard deviations off.
+        /// Distance from the median, in robust standard deviations, beyond which a shot is an outlier. The default is a
+        /// choice of areograph; Shan et al. 2005 mention single shots that deviate by about 5 standard deviations.
         outlier_sigma: f64 = key(above_to(0.0, 1000.0)).or(5.0),
         /// Largest share of outliers. The default is a choice of areograph.
         outlier_share_max: f64 = key(from_to(0.0, 1.0)).or(0.05),
-        /// Fewest shots of a profile that is judged: windows clip profiles, and shorter ones are excluded, with a remark. A
-        /// site without a longer one is invalid where ranges can be tested. The default is one PEDR frame; the
-        /// paper's profiles have 71 to 174.
+        /// Smallest number of shots in a profile that is judged: windows clip profiles, and shorter profiles are
+        /// excluded, with a remark. A site without a sufficiently long profile is invalid where ranges can be tested.
+        /// The default is one PEDR frame; the profiles of Shan et al. 2005 have 71 to 174 shots.
         shots_min: u32 = key(whole_from_to(2, 1_000_000)).or(20),
-        /// Largest |mean| of range minus distance to the file's own spacecraft position: a test of
-        /// decoding, which needs no kernels. Both come from one orbit solution and agree to about a metre.
+        /// Largest |mean| of range minus distance to the spacecraft position in the PEDR file: a test of decoding,
+        /// independent of kernels. Footprint and spacecraft position are from one orbit solution, and range and
+        /// distance agree to about a metre.
         decoding_max_m: f64 = key(above_to(0.0, 1e6)).or(2.0),
-        /// Largest mean distance between the spacecraft positions of the file and of the kernels: a test of orbit,
+        /// Largest mean distance between the spacecraft positions in the file and from the kernels: a test of orbit,
         /// clock and datum. The default is twice the distance between the orbits of three producers (Shan et al. 2005);
-        /// 117 ms of the clock correspond to 400 m, IAU 1994 taken for 1991 to 2 km.
+        /// a clock error of 117 ms corresponds to 400 m, and IAU 1994 mistaken for IAU 1991 to 2 km.
         orbit_max_m: f64 = key(above_to(0.0, 1e6)).or(100.0),
         /// Half width of the clock bias scan, which tries biases on both sides of 0. The default is about four times
-        /// 0.117.
+        /// the MOLA bias of 0.117 s.
         scan_half_width_s: f64 = key(above_to(0.0, 10.0)).or(0.5),
-        /// Step of the scan: at most the half width, at least a 10000th of the whole.
+        /// Step of the clock bias scan: at most the half width, and at least a 10000th of the full width.
         scan_step_s: f64 = key(above_to(0.0, 10.0)).or(0.01),
     }
     check step_fits

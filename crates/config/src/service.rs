@@ -67,15 +67,16 @@ declare_table! {
 impl Document for ServiceConfig {
     const EXAMPLE: &'static str = "config/areograph.toml";
     const HEADER: &'static str = "\
-# The service of areograph, `areograph serve` and `areograph nightly`: every key with its unit, range and default.
+# Service of areograph (`areograph serve` and `areograph nightly`): every key with its unit, range and default.
 #
-# Only the folders of [inputs] are required; a key that is left out has the default given here. Relative paths
+# Only the folders of [inputs] are required; an omitted key has the default given here. Relative paths
 # are relative to the folder of this file. Schema: schema/service.schema.json
 
 ";
     const SCHEMA: [&'static str; 2] = [
         "Service configuration of areograph",
-        "The TOML file of the service as JSON. areograph checks more than a schema can: agreement between keys, and existence of folders.",
+        "The TOML file of the service as JSON. areograph checks more than a schema can: the agreement \
+         between keys, and the existence of folders.",
     ];
 
     fn with_file(self, file: PathBuf, blake3: String, keys: BTreeMap<String, String>) -> Self {
@@ -89,14 +90,14 @@ impl Document for ServiceConfig {
 }
 
 declare_table! {
-    /// Folders that are read. Site files may name files below these folders only. A folder must exist when the
-    /// service first reads it; later it may be temporarily absent, and its sites are held.
+    /// Input folders. Site files may refer only to files below these folders. A folder must exist when the service
+    /// first reads it; if it is temporarily absent later, the sites that use it are suspended.
     pub struct ServiceInputs {
-        /// Folders of site files (`*.toml`, without subfolders). The next poll detects files that appear or change.
+        /// Folders of site files (`*.toml`, without subfolders). The next poll detects new and changed files.
         sites: Vec<PathBuf> = key(list(MIRROR).each_once("each folder once")).required().example(r#"["sites"]"#),
-        /// Folders of kernels, with their subfolders.
+        /// Kernel folders, including subfolders.
         kernels: Vec<PathBuf> = key(list(MIRROR).each_once("each folder once")).required().example(r#"["kernels"]"#),
-        /// Folders of PEDR files, labels and tie points, with their subfolders.
+        /// Folders of PEDR files, labels and tie points, including subfolders.
         data: Vec<PathBuf> = key(list(MIRROR).each_once("each folder once"))
             .required()
             .example(r#"["pedr", "labels", "ties"]"#),
@@ -104,33 +105,33 @@ declare_table! {
 }
 
 declare_table! {
-    /// Folders that are written; they are created if missing.
+    /// Output folders; created if missing.
     pub struct ServiceOutputs {
-        /// Products: `<products>/<site>/current` leads to the products of the newest valid run.
+        /// Folder of the products: `<products>/<site>/current` refers to the products of the newest valid run.
         products: PathBuf = key(text()).or("products".to_owned()).then(|path, keys: &mut Keys<'_, '_>| keys.review().resolve(&path)),
-        /// Database, logs and copies of the database; on a local disk, for one service only.
+        /// Folder of the database, its copies and the logs; on a local disk, for one service only.
         state: PathBuf = key(text()).or("state".to_owned()).then(|path, keys: &mut Keys<'_, '_>| keys.review().resolve(&path)),
     }
 }
 
 declare_table! {
-    /// When every site is checked, whether or not a change was detected.
+    /// Times at which every site is checked, whether or not a change was detected.
     pub struct ScheduleConfig {
-        /// Five fields: minute, hour, day of the month, month, day of the week.
+        /// Time of the check in five fields: minute, hour, day of the month, month, day of the week.
         cron: String = key(matching(
-            "five fields as in `30 2 * * *`",
+            "five fields such as `30 2 * * *`",
             r"^\S+( +\S+){4}$",
             |text| text.split_ascii_whitespace().count() == 5,
         )).or("30 2 * * *".to_owned()),
-        /// IANA time zone of these fields. A time that daylight saving skips is moved to the end of the gap; of a
-        /// repeated time the first counts.
+        /// IANA time zone of `cron`. A time that daylight saving skips is moved to the end of the gap; a repeated time
+        /// applies at its first occurrence.
         zone: String = key(matching(
-            "a time zone as in Europe/Berlin or UTC",
+            "a time zone such as Europe/Berlin or UTC",
             r"^[A-Za-z0-9_+/-]+$",
             |text| text.parse::<chrono_tz::Tz>().is_ok(),
         )).or("UTC".to_owned()),
-        /// A night that was missed because the service did not run is made up for if it is not older than this; of
-        /// several nights only the newest.
+        /// Largest age of a missed night that the service makes up for after a restart; of several missed nights, only
+        /// the newest is made up for.
         catch_up_h: f64 = key(from_to(0.0, 8784.0)).or(36.0),
     }
 }
@@ -140,37 +141,40 @@ declare_table! {
     pub struct ChangesConfig {
         /// Time between two polls of all folders.
         scan_interval_s: f64 = key(from_to(0.05, 86_400.0)).or(60.0),
-        /// A folder is used when nothing below it has changed for this time: mirrors copy slowly.
+        /// Time without changes in a folder after which the folder is used: mirrors copy slowly.
         quiet_period_s: f64 = key(from_to(0.0, 86_400.0)).or(600.0),
-        /// A folder that has lost a larger share of its files is treated as unavailable, and its sites are held.
+        /// Largest share of files that may disappear from a folder; above this limit, the folder is treated as
+        /// unavailable, and the sites that use it are suspended.
         max_loss: f64 = key(from_to(0.0, 1.0)).or(0.2),
-        /// Longest time that listing a folder may take; a dead mount does not answer.
+        /// Longest time for listing a folder; an unavailable mount does not respond.
         sweep_limit_s: f64 = key(from_to(0.1, 3600.0)).or(30.0),
-        /// Interval at which all files are read again, even if the file system reports no change, days; 0 never.
+        /// Interval at which all files are reread, even if the file system reports no change, days; 0 disables
+        /// rereading.
         scrub_days: f64 = key(from_to(0.0, 3660.0)).or(7.0),
-        /// Rate at which published products are read again, mebibytes per second: after a night, while no site runs.
+        /// Rate at which published products are reread after a night, while no site runs, mebibytes per second.
         scrub_mib_per_s: f64 = key(from_to(0.1, 100_000.0)).or(32.0),
     }
 }
 
 declare_table! {
-    /// The processes that run sites, one site each.
+    /// Worker processes, which run one site each.
     pub struct WorkersConfig {
-        /// Number of processes that run at the same time.
+        /// Number of simultaneous worker processes.
         count: u16 = key(whole_from_to(1, 256)).or(2),
-        /// Threads of each process.
+        /// Number of threads of each process.
         threads: u16 = key(whole_from_to(1, 1024)).or(2),
-        /// Memory that each process may take, mebibytes. A worker takes about 106 before it reads a site.
+        /// Memory limit of each process, mebibytes. A worker uses about 106 before it reads a site.
         memory_mib: u32 = key(whole_from_to(512, 1 << 24)).or(8192),
-        /// Longest time for a site.
+        /// Longest run time of a site.
         deadline_s: f64 = key(from_to(1.0, 2_592_000.0)).or(21_600.0),
-        /// A worker without a heartbeat for this time is ended.
+        /// Time without a heartbeat after which a worker is terminated.
         silence_s: f64 = key(from_to(1.0, 86_400.0)).or(30.0),
-        /// Longest log of an attempt, kibibytes; its middle is left out.
+        /// Largest log of an attempt, kibibytes; the middle of a larger log is omitted.
         log_max_kib: u32 = key(whole_from_to(16, 1 << 20)).or(4096),
-        /// No site is started while the disk of products or state has less space, mebibytes.
+        /// Free space on the disks of products and state below which no site is started, mebibytes.
         min_free_mib: u32 = key(whole_from_to(0, 1 << 24)).or(1024),
-        /// Delay of the first attempt after a failure of input or output; each further one doubles it, up to 15 minutes.
+        /// Delay before the first retry after an input or output failure; each further retry doubles the delay, up to
+        /// 15 minutes.
         retry_s: f64 = key(from_to(0.0, 900.0)).or(30.0),
     }
 }
@@ -178,33 +182,34 @@ declare_table! {
 declare_table! {
     /// Retention. The current run, its predecessor and pinned runs are always kept.
     pub struct RetentionConfig {
-        /// Newest runs of each site.
+        /// Number of the newest runs kept for each site.
         runs: u32 = key(whole_from_to(1, 100_000)).or(14),
-        /// Number of weeks for which one run a week is kept.
+        /// Number of weeks for which one run per week is kept.
         weeks: u32 = key(whole_from_to(0, 1040)).or(52),
-        /// Newest events.
+        /// Number of the newest events kept.
         events: u32 = key(whole_from_to(1000, 100_000_000)).or(100_000),
-        /// Logs of attempts whose runs were removed, days.
+        /// Retention of the logs of attempts whose runs were removed, days.
         logs_days: f64 = key(from_to(0.0, 36_600.0)).or(90.0),
-        /// Figures of removed runs, which the trends of a site show, days.
+        /// Retention of the figures of removed runs for site trends, days.
         history_days: f64 = key(from_to(0.0, 36_600.0)).or(1830.0),
-        /// Nightly copies of the database.
+        /// Number of nightly database copies kept.
         copies: u32 = key(whole_from_to(0, 1000)).or(7),
     }
 }
 
 declare_table! {
-    /// Limits beyond which a site counts as stale. A site whose inputs did not change is fresh, however old its run.
+    /// Limits beyond which a site counts as stale. A site with unchanged inputs is fresh, regardless of the age of its
+    /// run.
     pub struct FreshnessConfig {
-        /// Longest time from a change of its inputs to a run with them.
+        /// Longest time from a change of site inputs to a run with the new inputs.
         stale_after_h: f64 = key(from_to(0.0, 87_840.0)).or(48.0),
-        /// Longest time without a complete comparison of its inputs.
+        /// Longest time without a complete comparison of site inputs.
         unchecked_after_h: f64 = key(from_to(0.0, 87_840.0)).or(26.0),
     }
 }
 
 declare_table! {
-    /// Largest movement of a site between two runs without an alert, as for `areograph report diff`.
+    /// Largest movement of a site between two runs that causes no alert, as in `areograph report diff`.
     pub struct MovedConfig {
         /// Largest movement of a footprint, a camera or a boresight on the ground.
         limit_m: f64 = key(from_to(0.0, 1e7)).or(50.0),
@@ -218,26 +223,26 @@ declare_table! {
     pub struct HttpConfig {
         /// Address and port. An address that other machines can reach requires `behind_tls_proxy`.
         listen: SocketAddr = key(matching(
-            "an address with its port, as in 127.0.0.1:8470",
+            "an address with port, such as 127.0.0.1:8470",
             r"^[0-9a-fA-F.:\[\]]+:[0-9]{1,5}$",
             |text| text.parse::<SocketAddr>().is_ok(),
         )).or("127.0.0.1:8470".to_owned()).then(|text, _: &mut Keys<'_, '_>| socket_address(&text)),
-        /// The address under which a proxy shows the service, as in `https://mars.example.org`; requests for another host are
-        /// refused.
+        /// Public address of the service behind a proxy, such as `https://mars.example.org`; requests for a different
+        /// host are refused.
         public_url: String = key(matching(
-            "a host with https:// before it, without a path",
+            "https:// and a host, without a path",
             r"^(https://[A-Za-z0-9.-]+(:[0-9]{1,5})?)?$",
             |text| text.is_empty() || is_public_url(text),
         )).or(String::new()).unused(r#""https://mars.example.org""#),
-        /// A proxy in front of the service encrypts the connections.
+        /// Whether a proxy in front of the service encrypts the connections.
         behind_tls_proxy: bool = key(words([("no", false, ""), ("yes", true, "")])).or(false),
         /// Addresses of proxies whose `X-Forwarded-For` is trusted.
         trusted_proxies: Vec<IpAddr> = key(list_or_none(matching(
-            "addresses as in 10.0.0.1",
+            "addresses such as 10.0.0.1",
             r"^[0-9a-fA-F.:]+$",
             |text| text.parse::<IpAddr>().is_ok(),
         ))).or(Vec::new()).unused(r#"["127.0.0.1"]"#).then(|texts, _: &mut Keys<'_, '_>| addresses(&texts)),
-        /// Readers on a loopback address: all users of this machine, or holders of a token. Other addresses, and all
+        /// Whether all users of this machine may read on a loopback address without a token. Other addresses, and all
         /// changes, always require a token.
         open_reading: bool = key(words([
             ("yes", true, "reading from this machine needs no token"),
@@ -262,15 +267,15 @@ fn is_public_url(text: &str) -> bool {
 }
 
 declare_table! {
-    /// Programs that receive events, as JSON on their standard input: run without a shell, ended after 30 s, run
-    /// again when they fail.
+    /// Programs that receive events as JSON on standard input. They run without a shell, are terminated after 30 s, and
+    /// are rerun after a failure.
     pub struct HookConfig {
         /// Program and arguments; a relative path of the program is relative to the folder of this file.
         command: Vec<String> = key(list(any_text()))
             .required()
             .unused(r#"["/usr/local/bin/tell-us", "--mars"]"#)
             .then(program_below_the_file),
-        /// Events that it receives; all events when empty.
+        /// Events that the program receives; all events if empty.
         events: Vec<AlertKind> = key(list_or_none(words(AlertKind::WORDS))).or(Vec::new()).unused(r#"["failed", "night_complete"]"#),
     }
 }
@@ -331,19 +336,23 @@ impl AlertKind {
             Self::Recovered,
             "first success after a failure",
         ),
-        ("invalid", Self::Invalid, "products that are not valid"),
+        ("invalid", Self::Invalid, "a run with invalid products"),
         ("moved", Self::Moved, "a site moved beyond a limit"),
         (
             "stale",
             Self::Stale,
-            "a site is stale, or was not checked for too long",
+            "a site is stale, or has not been checked for too long",
         ),
         (
             "root_unavailable",
             Self::RootUnavailable,
-            "a folder of inputs is not available",
+            "an input folder is unavailable",
         ),
-        ("root_back", Self::RootBack, "a folder of inputs is back"),
+        (
+            "root_back",
+            Self::RootBack,
+            "an input folder is available again",
+        ),
         (
             "fetch_failed",
             Self::FetchFailed,
@@ -360,11 +369,7 @@ impl AlertKind {
             Self::DatabaseLost,
             "the database was lost and rebuilt from the products",
         ),
-        (
-            "night_complete",
-            Self::NightComplete,
-            "once a night: its summary",
-        ),
+        ("night_complete", Self::NightComplete, "summary of a night"),
     ];
 }
 
@@ -381,7 +386,7 @@ fn across_tables(service: &ServiceConfig, keys: &mut Keys<'_, '_>) {
         keys.refuse_below(
             "http",
             "listen",
-            "a loopback address as in 127.0.0.1:8470, or behind_tls_proxy = \"yes\" for a service behind a proxy that encrypts",
+            "a loopback address such as 127.0.0.1:8470, or behind_tls_proxy = \"yes\" for a service behind an encrypting proxy",
         );
     }
     let (products, state) = (&service.outputs.products, &service.outputs.state);
@@ -389,7 +394,7 @@ fn across_tables(service: &ServiceConfig, keys: &mut Keys<'_, '_>) {
         keys.refuse_below(
             "outputs",
             "state",
-            "another folder than that of the products",
+            "a folder other than the products folder",
         );
     }
     folders::outputs_apart(service, keys);

@@ -29,27 +29,28 @@ pub enum ShotLayout {
 }
 
 declare_table! {
-    /// Tables of laser shots (CSV), in place of `[pedr]`: those of other altimeters, or of MOLA from other sources. A
-    /// row is a shot; rows outside all windows are excluded; malformed rows are reported with file and line.
+    /// Tables of laser shots (CSV), in place of `[pedr]`: shots of other altimeters, or of MOLA from other sources.
+    /// Each row is a shot; rows outside all windows are excluded, and malformed rows are reported with file and line.
     /// Duplicate rows are counted once.
     pub struct ShotTableConfig: Deserialize {
-        /// Tables: paths or globs as in `[pedr]`.
+        /// Paths or globs of tables, as in `[pedr]`.
         #[serde(skip)]
         files: Vec<PathBuf> = key(Globs)
             .required_as("paths or globs of tables of shots")
             .unused(r#"["../lola/*.csv"]"#),
-        /// Columns that are known: then no table `columns`.
+        /// Known layout of columns, in place of a table `columns`.
         layout: Option<ShotLayout> = key(words([
-            ("lola_rdr", ShotLayout::LolaRdr, "LOLA's reduced data records as the Orbital Data Explorer gives them, 29 columns"),
+            ("lola_rdr", ShotLayout::LolaRdr, "LOLA reduced data records from the Orbital Data Explorer, 29 columns"),
             ("areograph", ShotLayout::Areograph, "footprints.csv of another site (products.formats, or areograph export)"),
-            ("ode_pedr", ShotLayout::OdePedr, "MOLA shots of the Orbital Data Explorer's PEDR query, ten columns, no spacecraft"),
+            ("ode_pedr", ShotLayout::OdePedr, "MOLA shots from the PEDR query of the Orbital Data Explorer, ten columns, no \
+                spacecraft"),
         ])).unused(r#""lola_rdr""#),
-        /// Datum of longitudes and latitudes; without it, the datum of the products.
+        /// Datum of longitudes and latitudes; the default is the datum of the products.
         datum: Option<Datum> = key(words([
             ("iau1991", Datum::Iau1991, ""),
             ("iau1994", Datum::Iau1994, ""),
             ("iau2000", Datum::Iau2000, "the datum of the products at Mars"),
-            ("moon_me", Datum::MoonMe, "the Moon's mean Earth/polar axis, the datum of the products there"),
+            ("moon_me", Datum::MoonMe, "mean Earth/polar axis frame, the datum of the products at the Moon"),
         ])).unused(r#""moon_me""#),
         /// Assignment of columns.
         columns: ShotColumns = table(),
@@ -58,7 +59,7 @@ declare_table! {
 }
 
 declare_table! {
-    /// Assignment of columns: the name in the first row, or the number, from 1. Units are those of the keys.
+    /// Assignment of columns, by name in the first row or by number from 1. The names of the keys state the units.
     pub struct ShotColumns: Deserialize {
         /// Time of the shot, UTC such as 2010-01-27T06:19:47.013. Or `et_s`.
         utc: Option<String> = key(text()).unused(r#""1""#),
@@ -66,14 +67,14 @@ declare_table! {
         et_s: Option<String> = key(text()).unused(r#""16""#),
         /// East longitude of the footprint.
         longitude_deg: Option<String> = key(text()).unused(r#""2""#),
-        /// Latitude of the direction from the centre of the body.
+        /// Planetocentric latitude of the footprint.
         latitude_deg: Option<String> = key(text()).unused(r#""3""#),
         /// Distance of the footprint from the centre of the body. Or `radius_m`, or `height_m`.
         radius_km: Option<String> = key(text()).unused(r#""4""#),
         /// Distance of the footprint from the centre of the body, metres.
         radius_m: Option<String> = key(text()).unused(r#""planet_rad""#),
-        /// Or the height of the footprint above the ellipsoid of the products, along the radius: at the Moon above
-        /// 1737.4 km.
+        /// Alternatively, height of the footprint above the ellipsoid of the products, along the radius; at the Moon,
+        /// above the radius of 1737.4 km.
         height_m: Option<String> = key(text()).unused(r#""height""#),
         /// One-way range from the spacecraft. Or `range_m`.
         range_km: Option<String> = key(text()).unused(r#""5""#),
@@ -81,13 +82,13 @@ declare_table! {
         range_m: Option<String> = key(text()).unused(r#""range""#),
         /// East longitude of the spacecraft in the table's own orbit solution.
         spacecraft_longitude_deg: Option<String> = key(text()).unused(r#""19""#),
-        /// Latitude of the direction from the centre of the body to the spacecraft.
+        /// Planetocentric latitude of the spacecraft.
         spacecraft_latitude_deg: Option<String> = key(text()).unused(r#""20""#),
         /// Distance of the spacecraft from the centre of the body. Or `spacecraft_radius_m`.
         spacecraft_radius_km: Option<String> = key(text()).unused(r#""21""#),
         /// Distance of the spacecraft from the centre of the body, metres.
         spacecraft_radius_m: Option<String> = key(text()).unused(r#""sc_rad""#),
-        /// Number of the orbit; without it 0, and only pauses separate profiles.
+        /// Orbit number. Without this key it is 0, and only pauses separate profiles.
         orbit: Option<String> = key(text()).unused(r#""orbit""#),
     }
 }
@@ -167,14 +168,14 @@ fn has_columns(_: &ShotTableConfig, keys: &mut Keys<'_, '_>) {
     let (layout, columns) = (keys.span_of("layout"), keys.span_of("columns"));
     match (layout, columns) {
         (Some(_), Some(_)) => {
-            keys.refuse("layout", "a layout, or a table columns, not both");
+            keys.refuse("layout", "a layout or a table [shots.columns], not both");
             return;
         }
         (Some(_), None) => return,
         (None, None) => {
             keys.missing(
                 "layout",
-                "a layout, or a table columns with the column of each quantity",
+                "a layout, or a table [shots.columns] with the column of each quantity",
             );
             return;
         }

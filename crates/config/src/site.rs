@@ -43,20 +43,20 @@ declare_table! {
     /// Everything that `areograph run` needs to know about a site: every value checked, metres, radians and
     /// seconds inside.
     pub struct SiteConfig: Deserialize {
-        /// Identifier, and the name of the folder of its products.
+        /// Identifier of the site, and name of its products folder.
         site: String = key(lower_case_identifier()).required().example(r#""eos_chasma""#),
         /// Free text for the report.
         description: String = key(any_text())
             .or(String::new())
             .example(r#""Eos Chasma, one of the three study sites of Shan et al. 2005""#),
-        /// The body: its rotation and shape, and so the frame, heights and maps of all products, are those of
-        /// `config/bodies`. At a body other than Mars, images come with support data and shots from tables.
+        /// Body of the site: its rotation and shape in `config/bodies` determine the frame, heights and maps of all
+        /// products. At a body other than Mars, images require support data, and shots are read from tables.
         body: Body = key(words([
             ("mars", Body::Mars, "in IAU 2000"),
             ("moon", Body::Moon, "in the mean Earth/polar axis frame, radius 1737.4 km"),
         ])).or(Body::Mars),
-        /// The altimeter of the PEDR files, or of the tables of shots: `mola`, `lola`, or the path of an altimeter file like
-        /// those in `config/altimeters`.
+        /// Altimeter of the PEDR files or tables of shots: `mola`, `lola`, or the path of an altimeter file as in
+        /// `config/altimeters`.
         altimeter: Altimeter = key(ALTIMETER).or(usual_altimeter().clone()),
         /// The file it was read from.
         file: PathBuf = of_the_file(),
@@ -95,7 +95,7 @@ declare_table! {
         laser_surface: MolaSurfaceConfig = table().was("mola_surface"),
         /// Combined adjustment.
         adjustment: AdjustmentConfig = table(),
-        /// Terrain model of a pair of images.
+        /// Terrain model from a pair of images.
         surface: SurfaceConfig = table(),
         /// Limits on tie points, their adjustment and the terrain model.
         limits: LimitsConfig = table(),
@@ -109,18 +109,18 @@ declare_table! {
 impl Document for SiteConfig {
     const EXAMPLE: &'static str = SITE_EXAMPLE;
     const HEADER: &'static str = "\
-# Site configuration of areograph, every key with its unit, range and default.
+# Site configuration of areograph: every key with its unit, range and default.
 #
-# Only `site`, one source of kernels, and either [pedr] (or [[shots]]) with [[windows]] or [[images]] are required;
-# a key that is left out has the default given here. Relative paths are relative to the folder of this file.
-# Angles are degrees, exposures milliseconds, times seconds; longitudes are east, latitudes
-# areocentric, both in the frame of the body: IAU 2000 of Mars. Schema: ../schema/site.schema.json
+# Only `site`, one kernel source, and [pedr] (or [[shots]]) with [[windows]], or else [[images]], are required;
+# an omitted key has the default given here. Relative paths are relative to the folder of this file.
+# Angles are in degrees, exposures in milliseconds, times in seconds; longitudes are east and latitudes
+# areocentric, in the frame of the body: IAU 2000 for Mars. Schema: ../schema/site.schema.json
 
 ";
     const SCHEMA: [&'static str; 2] = [
         "Site configuration of areograph",
-        "The TOML file of one site as JSON. areograph checks more than a schema can: existence of files, order \
-         within windows, agreement between keys.",
+        "The TOML file of one site as JSON. areograph checks more than a schema can: the existence of files, \
+         the order within windows, and the agreement between keys.",
     ];
 
     fn with_file(self, file: PathBuf, blake3: String, keys: BTreeMap<String, String>) -> Self {
@@ -216,14 +216,14 @@ fn images_of_surface(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     match &site.surface.images {
         None if known.len() == 2 => {}
         None if known.len() < 2 => {
-            let expected = "no cell, or at least two images with images.pixels";
+            let expected = "no cell_m, or at least two images with images.pixels";
             keys.refuse_below("surface", "cell_m", expected);
         }
         None => keys.refuse_below(
             "surface",
             "cell_m",
             format!(
-                "surface.images beside it: two of {}, which have pixels",
+                "surface.images as well: two of {}, which have pixels",
                 known.join(", ")
             ),
         ),
@@ -231,7 +231,7 @@ fn images_of_surface(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
             let is_known = |id: &String| known.contains(&&**id);
             if one == other || !is_known(one) || !is_known(other) {
                 let expected = format!(
-                    "two different images with images.pixels, of which the site has {}",
+                    "two different images with images.pixels; the site has {}",
                     if known.is_empty() {
                         "none".to_owned()
                     } else {
@@ -257,7 +257,7 @@ fn something_to_do(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
         return;
     }
     if let Some(windows) = windows {
-        let text = "windows are never used: there is no table [pedr]";
+        let text = "windows are never used without a table [pedr] or tables [[shots]]";
         keys.review().warn(windows, text.to_owned());
     }
     match keys.span_of("images") {
@@ -284,7 +284,8 @@ fn altimeter_of_pedr(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
         let name = &usual.name;
         keys.refuse(
             "altimeter",
-            format!("{}, whose shots PEDR files hold; shots of altimeters other than {name} come in tables [[shots]]", usual.id),
+            format!("{}, because PEDR files contain its shots; shots of altimeters other than {name} require tables \
+                 [[shots]]", usual.id),
         );
     }
 }
@@ -309,7 +310,7 @@ fn other_bodies(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
         let layout = table.get("layout");
         if let Some(layout) = layout.filter(|word| word.get_ref().as_str() == Some("ode_pedr")) {
             let expected =
-                format!("the layout of a table of {body}: this one holds shots of MOLA at Mars");
+                format!("the layout of a table of {body}: this layout is for MOLA shots at Mars");
             keys.review()
                 .refuse(layout.span(), "shots.layout", expected);
         }
@@ -320,7 +321,7 @@ fn other_bodies(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     }
     if site.images.iter().any(|image| image.isd.is_none()) {
         let text = format!(
-            "images on {body} need support data (images.isd): labels and kernels are read only for spacecraft at Mars"
+            "images of {body} require support data (images.isd): labels and kernels are read only for spacecraft at Mars"
         );
         let span = keys.span_of("images");
         keys.review().problem(span, text);
@@ -343,8 +344,8 @@ fn pointing_of_instruments(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
         let spacecraft = camera.spacecraft;
         if used_s.abs() > spacecraft.ck_bias_max_s {
             let expected = format!(
-                "no such key: it holds for all images of the site, and attitude kernels of {}, which carries {}, need no \
-                 time correction; the bias of a different camera belongs in a separate instrument file",
+                "no such key, because it applies to all images of the site: attitude kernels of {}, which carries {}, need no \
+                 time correction; state the bias of a different camera in a separate instrument file",
                 spacecraft.full_name, camera.name
             );
             keys.refuse_below("pointing", "ck_bias_s", expected);
@@ -375,7 +376,7 @@ fn kernels_of_spacecraft(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     let mut cameras = cameras(&site.images).into_iter();
     if let Some(camera) = cameras.find(|camera| !camera.spacecraft.has_laser()) {
         let expected = format!(
-            "kernels.files or kernels.metakernel: kernels of {}, which carries {}, are not chosen by the program",
+            "kernels.files or kernels.metakernel: the program does not select kernels of {}, which carries {}",
             camera.spacecraft.full_name, camera.name
         );
         keys.refuse_below("kernels", key, expected);
@@ -416,7 +417,7 @@ fn images_of_windows(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
         if id.get_ref().as_str().is_some_and(|id| !known.contains(id)) {
             let images: Vec<&str> = known.iter().copied().collect();
             let expected = if images.is_empty() {
-                "an image of the site, which has none".to_owned()
+                "an image of the site, but the site has none".to_owned()
             } else {
                 format!("one of the site's images: {}", images.join(", "))
             };

@@ -10,17 +10,17 @@ use super::{
 
 declare_table! {
     /// A terrain model that areograph computes from a pair of images with `pixels`, with the adjusted orientation if
-    /// there is one: `surface.tif`, its standard deviations, and its comparison with the altimeter. Without `cell_m` no
-    /// model is made.
+    /// there is one: `surface.tif`, its standard deviations, and its comparison with the altimeter. Without `cell_m`,
+    /// no terrain model is computed.
     pub struct SurfaceConfig: Deserialize {
-        /// Edge of a cell. Three pixels of the coarser image are usual: a height refers to a square of 17 pixels. Cells
-        /// finer than a pixel are refused; for cells larger than six pixels, images are compared at a coarser size,
-        /// which is quick.
+        /// Edge of a cell of the terrain model, usually three pixels of the coarser image; each height refers to a
+        /// square of 17 pixels. Cells smaller than a pixel are refused. For cells larger than six pixels, images are
+        /// compared at a coarser resolution, which is fast.
         cell_m: Option<f64> = key(above_to(0.0, 1e5)).unused("15.0"),
-        /// Cell edge for orthoimages on this terrain model, made from every image with `pixels` and tie points; the ground size of an image
-        /// pixel is usual. Without this key no orthoimages are made.
+        /// Edge of a cell of orthoimages on this terrain model, usually the ground size of an image pixel. Orthoimages
+        /// are computed from every image with `pixels` and tie points; without this key, none is computed.
         orthoimage_cell_m: Option<f64> = key(above_to(0.0, 1e5)).unused("5.0"),
-        /// Identifiers of the two images, where more than two of the site have pixels.
+        /// Identifiers of the two images, if more than two images of the site have `pixels`.
         images: Option<[String; 2]> = key(several(identifier(), "identifiers of two images")).unused(r#"["m0402852", "m0403104"]"#),
     }
     check a_cell_is_given

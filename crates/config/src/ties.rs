@@ -17,21 +17,21 @@ use super::{
 };
 
 declare_table! {
-    /// Tie points between the images. Without this table nothing is intersected or adjusted.
+    /// Tie points between the images. Without this table, there is no intersection and no adjustment.
     pub struct TiesConfig: Deserialize {
-        /// Paths or globs as in `[pedr]`: tables (.csv) with the columns `point_id`, `serial_number`, `sample`, `line`,
-        /// one row per measurement, and where known `line_sigma_px` and `sample_sigma_px`, its standard deviations; or
-        /// ISIS control networks in PVL (a binary one: cnetbin2pvl), whose fixed or constrained points provide their
-        /// coordinates, IAU 2000. Lines and samples are counted as in ISIS: the middle of the first pixel is 1.
-        /// `serial_number` is an image's `serial_number` above, or its `id`; measurements in other images are counted
-        /// and excluded.
+        /// Paths or globs, as in `[pedr]`, of tables (.csv) or of ISIS control networks in PVL (convert binary networks
+        /// with cnetbin2pvl). Tables have one row per measurement: `point_id`, `serial_number`, `sample`, `line` and,
+        /// where known, the standard deviations `line_sigma_px` and `sample_sigma_px`. Fixed or constrained points of
+        /// control networks provide coordinates in IAU 2000. Lines and samples are counted as in ISIS: the middle of
+        /// the first pixel is 1. `serial_number` is the `serial_number` or `id` of an image; measurements in other
+        /// images are counted and excluded.
         #[serde(skip)]
         files: Vec<PathBuf> = key(Globs)
             .or(Vec::new())
             .example(r#"["../ties/*.csv"]"#),
-        /// Whether areograph measures tie points itself, in addition to those of files: every pair of images that have
-        /// `pixels` is matched where both show the same ground with enough texture, and again with the orientation that
-        /// these tie points adjust. Each measurement has the standard deviations of its match.
+        /// Whether areograph measures tie points itself, in addition to tie points in files. Every pair of images with
+        /// `pixels` is matched where both images show the same ground with sufficient texture, and again with the
+        /// orientation adjusted with these tie points. Each measurement has the standard deviations of its match.
         matched as "match": bool = key(Switch).or(false),
     }
     check something_measures
@@ -62,11 +62,11 @@ impl TiesConfig {
 }
 
 declare_table! {
-    /// Ground points of the tie points, with the orientation held fixed.
+    /// Intersection of tie points, with the orientation held fixed.
     pub struct IntersectionConfig: Copy, Deserialize, JsonSchema {
         /// Weights of the measurements.
         weighting: Weighting = group::<WeightingKeys>().map(WeightingKeys::weighting),
-        /// Smallest angle between the two rays of a point that differ most.
+        /// Smallest permitted convergence angle, between the two most divergent rays of a point.
         convergence_min_rad as "convergence_min_deg": f64 =
             key(above_to(0.0, 90.0)).or(0.5).map(|degrees| degrees * RADIANS_PER_DEGREE),
     }
@@ -75,18 +75,18 @@ declare_table! {
 declare_table! {
     /// Weights of the measurements.
     struct WeightingKeys {
-        /// The unit in which measurement errors are equal in all images.
+        /// Unit in which measurement errors are equal in all images.
         weighting: ErrorUnit = key(words([
             ("focal", ErrorUnit::Focal, "pixels of the focal plane, along and across the track"),
             (
                 "line",
                 ErrorUnit::Line,
-                "lines along the track, pixels across it; this changes how images share a disagreement",
+                "lines along the track and pixels across it; this changes the distribution of a disagreement among images",
             ),
         ])).or(ErrorUnit::Focal),
-        /// Standard deviation of measurements; with "line" only across the track.
+        /// Standard deviation of measurements; if `weighting` is "line", only across the track.
         sigma_px: f64 = key(SIGMA).or(1.0),
-        /// Standard deviation along the track with "line".
+        /// Standard deviation of measurements along the track if `weighting` is "line".
         sigma_lines: f64 = key(SIGMA).or(1.0).unused("1.0"),
     }
     check lines_are_used

@@ -14,9 +14,9 @@ macro_rules! levels {
             None,
             $(#[$constant_about])*
             $constant,
-            /// And a linear term in time.
+            /// Constant and linear terms in time.
             Velocity,
-            /// And a quadratic term.
+            /// Constant, linear and quadratic terms in time.
             Acceleration,
         }
 
@@ -39,14 +39,14 @@ macro_rules! levels {
 }
 
 levels! {
-    /// Unknowns of the position of an image: each level adds a power of time (jigsaw's `spsolve`).
+    /// Position unknowns of an image: each level adds a power of time (`spsolve` in jigsaw).
     PositionUnknowns,
     /// A constant.
     Position "position"
 }
 
 levels! {
-    /// Unknowns of the rotation of an image, likewise (jigsaw's `camsolve`).
+    /// Rotation unknowns of an image: each level adds a power of time (`camsolve` in jigsaw).
     RotationUnknowns,
     /// Constant angles.
     Angles "angles"

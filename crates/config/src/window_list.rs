@@ -53,7 +53,9 @@ enum WindowError {
         expected: &'static str,
     },
     #[error("{0}")]
-    #[cause("correct the file: GeoJSON polygons of east longitude and areocentric latitude")]
+    #[cause(
+        "correct the file; expected GeoJSON polygons in east longitude and areocentric latitude"
+    )]
     Polygon(String),
     #[error(
         "window {0} is the outline of an image; expected longitude_deg and latitude_deg, or polygon"
@@ -105,7 +107,7 @@ pub fn window_of_box(id: &str, edges_deg: [f64; 4]) -> Result<WindowConfig, Erro
         return refuse(format!("latitudes {south} and {north}"), expected);
     }
     let Some([west, east]) = wrapped_longitudes([west, east]) else {
-        let expected = "east more than 0 and at most 360 degrees east of west";
+        let expected = "an east edge more than 0 and at most 360 degrees east of the west edge";
         return refuse(format!("longitudes {west} and {east}"), expected);
     };
     let [west_rad, east_rad, south_rad, north_rad] =
@@ -161,7 +163,7 @@ mod tests {
             ([0.0, 1.0, f64::NAN, 1.0], "latitudes NaN and 1"),
             (
                 [5.0, 5.0, 0.0, 1.0],
-                "east more than 0 and at most 360 degrees east of west",
+                "an east edge more than 0 and at most 360 degrees east of the west edge",
             ),
         ] {
             let failure = window_of_box("a", edges).unwrap_err();

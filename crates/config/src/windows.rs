@@ -26,10 +26,10 @@ pub(super) const WINDOWS: Many = Many {
     count: Some((1, WINDOWS_MAX)),
     purpose: "",
     further: &[&[
-        " Instead of a box: polygons of a GeoJSON file (Polygon, MultiPolygon, Feature, FeatureCollection),",
-        " coordinates [longitude, latitude] as above, rings closed and less than 360 degrees wide, at most",
-        " 100000 vertices and 16 MiB. Cut polygons that cross 180 degrees in two, or let longitudes run on to 360. An",
-        " edge from 170 to -170 crosses 180 degrees in a ring narrower than 90; every other edge spans at most 180 as written.",
+        " Instead of a box: polygons of a GeoJSON file (Polygon, MultiPolygon, Feature, FeatureCollection), with",
+        " coordinates [longitude, latitude], closed rings less than 360 degrees wide, and at most 100000 vertices",
+        " and 16 MiB. Divide polygons that cross 180 degrees, or continue longitudes to 360. An edge from 170 to -170",
+        " crosses 180 degrees in a ring narrower than 90 degrees; every other edge spans at most 180 degrees as written.",
     ]],
 };
 
@@ -43,7 +43,7 @@ pub struct WindowConfig {
 }
 
 declare_table! {
-    /// 1 to 64 windows; a footprint belongs to every window that its own position lies in.
+    /// 1 to 64 windows; a footprint belongs to every window that contains its own position.
     fill WindowConfig {
         /// Identifier, unique in the site.
         id = key(identifier()).required().example(r#""site""#).example_in(1, r#""outline""#).example_in(2, r#""image""#),
@@ -55,20 +55,20 @@ declare_table! {
 declare_table! {
     /// Outline of a window.
     struct ShapeKeys {
-        /// West and east edge. West above east crosses 0 (or 180) degrees: `[350, 10]` is 20 degrees wide. `[0, 360]`
-        /// or `[-180, 180]` means all longitudes; then a window that reaches 90 or -90 degrees of latitude holds the
-        /// pole.
+        /// West and east edges. If west exceeds east, the window crosses 0 (or 180) degrees: `[350, 10]` is 20 degrees
+        /// wide. `[0, 360]` or `[-180, 180]` means all longitudes; a window that also reaches 90 or -90 degrees of
+        /// latitude contains the pole.
         longitude_deg: Option<[f64; 2]> =
             key(several(from_to(-180.0, 360.0), "two numbers [west, east]")).example("[318.0, 318.7]"),
-        /// South and north edge, areocentric.
+        /// South and north edges, areocentric.
         latitude_deg: Option<[f64; 2]> =
             key(several(from_to(-90.0, 90.0), "two numbers [south, north]")).example("[-14.0, -12.9]"),
         /// GeoJSON file.
         polygon: Option<PathBuf> = key(FILE).example_in(1, r#""outline.geojson""#),
-        /// Identifier of an image of the site: the window is its outline, computed from its times and the kernels (of
-        /// rival sets, the first).
+        /// Identifier of an image of the site. The window is the outline of this image, computed from image times and
+        /// kernels (of rival sets, the first).
         image: Option<String> = key(identifier()).example_in(2, r#""E02-02855""#),
-        /// Least margin of the window beyond the outline of the image.
+        /// Smallest margin of the window beyond the outline of the image.
         margin_km: Option<f64> = key(from_to(0.0, 1_000.0)).example_in(2, "5.0"),
     }
 }
@@ -148,7 +148,7 @@ fn bounds(
         if wrapped.is_none() {
             keys.refuse(
                 "longitude_deg",
-                "[west, east], with east more than 0 and at most 360 degrees east of west",
+                "[west, east], with the east edge more than 0 and at most 360 degrees east of the west edge",
             );
         }
         if wrapped.is_some() {
@@ -181,7 +181,7 @@ fn name_wide([west, east]: [f64; 2], keys: &mut Keys<'_, '_>) {
         keys.review().warn(
             span,
             format!(
-                "longitude_deg goes {width}° eastward, from {west}° to {east}°; if it should be the other {}°, write \
+                "longitude_deg spans {width}° eastward, from {west}° to {east}°; for the other {}°, write \
                  [{east}, {west}]",
                 360.0 - width
             ),

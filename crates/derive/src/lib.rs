@@ -116,7 +116,12 @@ fn expand(input: &DeriveInput) -> Result<TokenStream> {
             statement: common,
             span: input.ident.span(),
         }],
-        Data::Union(_) => return Err(Error::new_spanned(&input.ident, "a union is no cause")),
+        Data::Union(_) => {
+            return Err(Error::new_spanned(
+                &input.ident,
+                "a union cannot be a cause",
+            ));
+        }
     };
     let kinds = cases.iter().map(Case::kind).collect::<Result<Vec<_>>>()?;
     let advice = cases.iter().map(Case::advice).collect::<Result<Vec<_>>>()?;
@@ -144,10 +149,14 @@ fn cases<'input>(variants: &'input DataEnum, common: &Statement) -> Result<Vec<C
         if let Some(like) = &statement.like {
             let mut others = variants.variants.iter();
             let other = others.find(|other| other.ident == *like);
-            let other = other.ok_or_else(|| Error::new_spanned(like, "no variant of this name"))?;
+            let other =
+                other.ok_or_else(|| Error::new_spanned(like, "no variant has this name"))?;
             statement = Statement::of(&other.attrs)?;
             if let Some(like) = &statement.like {
-                return Err(Error::new_spanned(like, "another variant is like this one"));
+                return Err(Error::new_spanned(
+                    like,
+                    "the variant that `like` names must not use `like` itself",
+                ));
             }
         }
         let name = &variant.ident;
@@ -266,7 +275,7 @@ mod tests {
                     Empty,
                 }
             )),
-            "no variant of this name"
+            "no variant has this name"
         );
         assert_eq!(
             refusal(&parse_quote!(
@@ -275,7 +284,7 @@ mod tests {
                     Empty,
                 }
             )),
-            "another variant is like this one"
+            "the variant that `like` names must not use `like` itself"
         );
     }
 

@@ -220,7 +220,7 @@ mod tests {
         ] {
             let found = refusal(answer);
             assert!(
-                found.contains("the service made no table") && found.contains(expected),
+                found.contains("the service returned no table") && found.contains(expected),
                 "{expected} in {found}"
             );
         }

@@ -303,7 +303,9 @@ impl Archives {
         let paths = paths.into_iter().map(|path| &**path);
         for path in paths.chain(volume).chain(folders) {
             if !is_path(path) {
-                return wrong(format!("{path:?} is not a path below its url"));
+                return wrong(format!(
+                    "{path:?} is not a path; expected a path relative to url"
+                ));
             }
         }
         for (orbit, utc) in &self.pedr.orbits {
@@ -326,15 +328,15 @@ impl Archives {
             .iter()
             .any(|seconds| !(0.001..=86_400.0).contains(seconds))
         {
-            return wrong("network or shots has a time outside of 0.001 to 86400 s".to_owned());
+            return wrong("a time in network or shots is outside 0.001 to 86400 s".to_owned());
         }
         if network.attempts == 0 || !(1..=8).contains(&network.connections_per_host) {
             return wrong(
-                "network has no attempt, or connections_per_host outside of 1 to 8".to_owned(),
+                "network.attempts is 0, or network.connections_per_host is not 1 to 8".to_owned(),
             );
         }
         if self.contact.contains(|letter: char| letter.is_control()) {
-            return wrong("contact has a control character".to_owned());
+            return wrong("contact contains a control character".to_owned());
         }
         Ok(())
     }
@@ -367,10 +369,10 @@ mod tests {
         );
         for (own, expected) in [
             ("[kernels]\nurl = \"file:///mirror\"", "ends in a slash"),
-            ("[kernels]\nindex = \"../x\"", "not a path below"),
-            ("[generic]\nlatest = [['..', '', '']]", "not a path below"),
-            ("[network]\nattempts = 0", "no attempt"),
-            ("[network]\nread_s = nan", "outside of 0.001"),
+            ("[kernels]\nindex = \"../x\"", "is not a path;"),
+            ("[generic]\nlatest = [['..', '', '']]", "is not a path;"),
+            ("[network]\nattempts = 0", "attempts is 0"),
+            ("[network]\nread_s = nan", "outside 0.001"),
             ("[kernel]\nurl = \"x/\"", "unknown field"),
             (
                 "[shots]\nurl = \"file:///mirror/livegds\"",

@@ -87,7 +87,7 @@ pub fn audit(filling: &Filling<'_>, plan: &Plan) -> Result<Audit> {
                 difference(&file.path, &name, &state, file.md5.as_deref())
             )),
             Standing::Unknown => audit.foreign.push(format!(
-                "{name}: planned, but not fetched by areograph: the next fetch compares it"
+                "{name}: planned, but not fetched by areograph; the next fetch compares it with the archive"
             )),
             Standing::Present => {}
         }
@@ -137,7 +137,7 @@ fn difference(path: &Path, name: &str, state: &State, md5: Option<&str>) -> Stri
     let size = path.metadata().map(|found| found.len()).unwrap_or_default();
     match (state.files.get(name), md5) {
         (Some(record), _) if record.bytes != size => {
-            format!("{size} bytes; fetched were {}", record.bytes)
+            format!("{size} bytes; expected {}, as fetched", record.bytes)
         }
         (Some(record), Some(md5)) => {
             format!(
@@ -145,6 +145,6 @@ fn difference(path: &Path, name: &str, state: &State, md5: Option<&str>) -> Stri
                 record.md5
             )
         }
-        _ => format!("{size} bytes, a size other than the index of the archive states"),
+        _ => format!("{size} bytes; the index of the archive states a different size"),
     }
 }

@@ -121,7 +121,7 @@ impl Client {
             }
             at = redirected(&at, &uri, header(&response, "location").unwrap_or_default())?;
         }
-        let (url, why) = (url.to_owned(), "it leads on again and again");
+        let (url, why) = (url.to_owned(), "there are too many redirections");
         Err(FetchError::Redirect { url, to: at, why }.into())
     }
 
@@ -282,7 +282,7 @@ fn redirected(from: &str, uri: &Uri, location: &str) -> Result<String, FetchErro
         let folder = uri.path().rsplit_once('/').map_or("", |(folder, _)| folder);
         format!("{base}{folder}/{location}")
     };
-    let to_uri: Uri = to.parse().map_err(|_| refused("it is no address"))?;
+    let to_uri: Uri = to.parse().map_err(|_| refused("it is not an address"))?;
     match (scheme, to_uri.scheme_str()) {
         (_, Some("https")) => Ok(to),
         ("http", Some("http")) if to_uri.authority() == host => Ok(to),
@@ -321,7 +321,7 @@ fn of_response(url: &str, response: Response<ureq::Body>, ask: Ask<'_>) -> Resul
         }
     };
     if header(&response, "content-encoding").is_some_and(|coding| coding != "identity") {
-        let problem = "the answer is encoded, although the file itself was asked for".to_owned();
+        let problem = "the answer is encoded, although the unencoded file was requested".to_owned();
         return Err(FetchError::Content {
             url: url.to_owned(),
             problem,

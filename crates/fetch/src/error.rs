@@ -7,7 +7,7 @@ use areograph_base::error::Cause;
 pub enum FetchError {
     /// A row or a label of an index is malformed.
     #[error("line {line}: {problem}")]
-    #[cause(Input: "fetch the index again by `areograph fetch --index`, or correct the file")]
+    #[cause(Input: "fetch the index again with `areograph fetch --index`, or correct the file")]
     Index {
         /// Line, counted from 1.
         line: usize,
@@ -15,8 +15,8 @@ pub enum FetchError {
         problem: String,
     },
     /// An index is not in the folder.
-    #[error("no copy of {name} is in this folder; expected the index of the archive ({url})")]
-    #[cause(Input: "run `areograph fetch --index` with the same options where the archive can be reached")]
+    #[error("this folder contains no copy of {name}; expected the index of the archive ({url})")]
+    #[cause(Input: "run `areograph fetch --index` with the same options on a computer that can reach the archive")]
     NoIndex {
         /// Name of the index.
         name: String,
@@ -25,10 +25,10 @@ pub enum FetchError {
     },
     /// The table of archives is invalid.
     #[error("{0}")]
-    #[cause(Configuration: "correct the table of archives; config/archives has the form")]
+    #[cause(Configuration: "correct the table of archives; see config/archives for its format")]
     Archives(String),
     /// Nothing is wanted.
-    #[error("nothing to fetch: no site file, box, dates, orbits or images")]
+    #[error("nothing to fetch: no site file, box, dates, orbits or images given")]
     #[cause(Configuration: "name a site file, or give --dates, --orbits, --image or --box")]
     Nothing,
     /// The archive refuses or does not have a file.
@@ -42,7 +42,7 @@ pub enum FetchError {
     },
     /// The archive cannot be reached, or fails again and again.
     #[error("{url}: {problem}; attempts: {attempts}")]
-    #[cause(Io: "run again later: transferred files are kept; `areograph fetch --plan` lists the missing ones")]
+    #[cause(Io: "run again later: transferred files are kept; `areograph fetch --plan` lists the missing files")]
     Network {
         /// Address.
         url: String,
@@ -52,7 +52,7 @@ pub enum FetchError {
         attempts: u32,
     },
     /// A redirection that is not followed.
-    #[error("{url} leads to {to}, which is not followed: {why}")]
+    #[error("{url} redirects to {to}, which is not followed: {why}")]
     #[cause(Io: "if the archive has moved, give its new address in a table (--archives)")]
     Redirect {
         /// Address.
@@ -63,7 +63,9 @@ pub enum FetchError {
         why: &'static str,
     },
     /// An address that is not fetched from.
-    #[error("{url} is not fetched from; expected https://, file://, or http:// of this computer")]
+    #[error(
+        "{url} is not a permitted address; expected https://, file://, or http:// on this computer"
+    )]
     #[cause(Configuration: "correct the address in the table of archives")]
     Address {
         /// Address.
@@ -71,7 +73,8 @@ pub enum FetchError {
     },
     /// The received data are not the file.
     #[error("{url}: {problem}")]
-    #[cause(Input: "run `areograph fetch --index` first: the index may be older than the file; else report it to the archive")]
+    #[cause(Input: "run `areograph fetch --index` first: the index may be older than the file; otherwise report the \
+                   problem to the archive")]
     Content {
         /// Address.
         url: String,
@@ -79,8 +82,8 @@ pub enum FetchError {
         problem: String,
     },
     /// A service refuses a query, or its answer is another one than expected.
-    #[error("{url}: the service made no table: {reason}")]
-    #[cause(Io: "open the address in a browser; reduce the window where it is too large, or run again later")]
+    #[error("{url}: the service returned no table: {reason}")]
+    #[cause(Io: "open the address in a browser; reduce the window if it is too large, or run again later")]
     Service {
         /// The query.
         url: String,
@@ -89,10 +92,11 @@ pub enum FetchError {
     },
     /// A service makes a table later.
     #[error(
-        "{url}: the service makes the table later, as job {job}; expected the table in its answer"
+        "{url}: the service has deferred the table to job {job}; expected the table in the answer"
     )]
-    #[cause(Io: "divide the window into smaller ones, or look up the job ({url} with jobid={job} in place of the query) and put its \
-                 *_pts_csv.csv into place yourself")]
+    #[cause(Io: "divide the window into smaller windows, or look \
+                   up the job ({url} with jobid={job} in place of the query) and put its \
+                 *_pts_csv.csv at the planned path yourself")]
     Deferred {
         /// The query.
         url: String,
@@ -107,8 +111,9 @@ pub enum FetchError {
         url: String,
     },
     /// A service made another table than was asked for.
-    #[error("{url}: this is not the table of the query: {problem}")]
-    #[cause(Input: "run again: the service makes the table anew; else open the query of `areograph fetch --plan` in a browser")]
+    #[error("{url} does not match the query: {problem}")]
+    #[cause(Input: "run again: the service makes a new table; otherwise open the query in a browser (`areograph fetch --plan` \
+                   lists it)")]
     Table {
         /// Address of the table at the service.
         url: String,
@@ -124,7 +129,7 @@ pub enum FetchError {
     },
     /// Files of a plan are not complete.
     #[error("{failed} of {planned} files are not complete")]
-    #[cause(Io: "see the messages above; run again: transferred files are kept")]
+    #[cause(Io: "see the messages above, and run again: transferred files are kept")]
     Incomplete {
         /// Files that failed.
         failed: usize,
@@ -132,14 +137,16 @@ pub enum FetchError {
         planned: usize,
     },
     /// Something is needed that no archive has.
-    #[error("all planned files are complete, but no index lists the remaining ones: {lacks}")]
-    #[cause(Coverage: "see the lines `in_no_index` above; other archives may have it (--archives)")]
+    #[error("all planned files are complete; items that no index lists: {lacks}")]
+    #[cause(Coverage: "see the `in_no_index` lines above; other archives may have the items (--archives)")]
     Lacks {
         /// Number of missing items.
         lacks: usize,
     },
     /// Recorded files have changed or are missing.
-    #[error("{damaged} of {files} recorded files are not as they were fetched")]
+    #[error(
+        "{damaged} of {files} recorded files have changed since they were fetched, or are missing"
+    )]
     #[cause(Input: "fetch them again: move damaged files away, or give --replace")]
     Damaged {
         /// Files that differ.
@@ -149,20 +156,20 @@ pub enum FetchError {
     },
     /// Another process fills the folder.
     #[error("another areograph fetch is filling this folder")]
-    #[cause(Io: "wait for it, or give this one another --into")]
+    #[cause(Io: "wait until it ends, or give a different folder with --into")]
     Busy,
     /// A stored state is malformed.
-    #[error("is not a state of areograph fetch: {0}")]
-    #[cause(Input: "move the file away: the next fetch examines all files anew")]
+    #[error("is not a state file of areograph fetch: {0}")]
+    #[cause(Input: "move the file away: the next fetch examines all files again")]
     State(String),
 }
 
 fn advice_on(status: u16) -> &'static str {
     match status {
-        401 | 403 => "the archive does not permit this; look at the address in a browser",
+        401 | 403 => "the archive does not permit access; open the address in a browser",
         404 | 410 => {
-            "run `areograph fetch --index`: the index may be older than the archive; else correct the address in the table of \
-             archives"
+            "run `areograph fetch --index`: the index may be older than the archive; otherwise correct the address in the \
+             table of archives"
         }
         _ => "run again later: transferred files are kept",
     }

@@ -55,7 +55,7 @@ pub(crate) fn examined(
     }
     if let Some(record) = known {
         let problem = format!(
-            "{} bytes with SHA-256 {}; fetched were {} bytes with {}",
+            "{} bytes with SHA-256 {}; expected {} bytes with {}, as fetched",
             hashed.bytes, hashed.sha256, record.bytes, record.sha256
         );
         return Err(conflict(problem));
@@ -70,7 +70,9 @@ pub(crate) fn examined(
     }
     if file.kind == FileKind::Shots {
         let bytes = hashed.bytes;
-        return Err(conflict(format!("{bytes} bytes, which no fetch retrieved")));
+        return Err(conflict(format!(
+            "{bytes} bytes that areograph did not fetch"
+        )));
     }
     let exact = file.bytes.filter(|_| file.is_exact);
     let length = match exact {

@@ -119,7 +119,7 @@ impl<'a> Filling<'a> {
         if let Some(folder) = &wish.pedr {
             if spans.is_empty() && wish.orbits.is_empty() {
                 plan.notes.push(
-                    "pedr: no image, dates or orbits: give --dates or --orbits for laser files"
+                    "pedr: no images, dates or orbits; give --dates or --orbits for laser files"
                         .to_owned(),
                 );
             }

@@ -76,7 +76,7 @@ pub(crate) fn receive(receiver: &Receiver<'_>, wish: &Wish<'_>) -> Result<Receiv
             // The service removes its files after some weeks.
             Err(failure) if is_lasting(&failure) => {
                 let path = wish.file.path.display();
-                tracing::info!("{path}: {}; the service is asked again", failure.cause);
+                tracing::info!("{path}: {}; the service is queried again", failure.cause);
             }
             other => return other,
         }
@@ -202,7 +202,7 @@ fn problem_of(path: &Path, box_deg: [f64; 4], stated: Option<u64>) -> Result<Opt
         )));
     }
     if let Some(last) = rows.last {
-        return Ok(Some(format!("its last row is malformed, {last}")));
+        return Ok(Some(format!("the last row is malformed ({last})")));
     }
     if rows.in_box == 0 {
         let [west, east, south, north] = box_deg;

@@ -190,7 +190,7 @@ impl Receiver<'_> {
             Reply::Unchanged | Reply::OtherFile => {
                 part.discard()?;
                 Err(Fault::Passing(
-                    "the part belongs to another file".to_owned(),
+                    "the partial file belongs to a different file".to_owned(),
                     None,
                 ))
             }
@@ -229,7 +229,7 @@ impl Receiver<'_> {
                 )));
             }
             (None, None) if !is_delimited && wanted.md5.is_none() => {
-                let problem = "neither server nor archive states size or checksum: its completeness cannot be verified";
+                let problem = "neither server nor archive states a size or checksum: the file cannot be verified as complete";
                 return Err(content(problem.to_owned()));
             }
             _ => {}
@@ -255,7 +255,7 @@ impl Receiver<'_> {
                 drop(writer);
                 part.discard()?;
                 let page = excerpt(&String::from_utf8_lossy(&buffer[..count]));
-                let problem = format!("a web page came in place of the file: {page}");
+                let problem = format!("a web page was received instead of the file: {page}");
                 return Err(content(problem));
             }
             let written = writer.write(&buffer[..count]);
@@ -263,7 +263,7 @@ impl Receiver<'_> {
             if length.is_some_and(|length| writer.bytes > length) {
                 part.discard()?;
                 return Err(Fault::Passing(
-                    "more bytes came than were announced".to_owned(),
+                    "more bytes were received than announced".to_owned(),
                     None,
                 ));
             }
@@ -281,7 +281,10 @@ impl Receiver<'_> {
 /// The complete body of an answer as a text.
 fn text_of(reply: Reply) -> std::result::Result<String, Fault> {
     let Reply::Body(answer) = reply else {
-        return Err(Fault::Passing("an answer without a text".to_owned(), None));
+        return Err(Fault::Passing(
+            "the answer contains no text".to_owned(),
+            None,
+        ));
     };
     let mut bytes = Vec::new();
     let read = |bytes: &mut Vec<u8>| -> io::Result<usize> {
@@ -296,7 +299,7 @@ fn text_of(reply: Reply) -> std::result::Result<String, Fault> {
                 .is_some_and(|length| count as u64 != length) =>
         {
             format!(
-                "an answer of {count} bytes; expected {:?}",
+                "the answer has {count} bytes; expected {:?}",
                 answer.meta.length
             )
         }
@@ -340,7 +343,7 @@ pub(crate) fn publish(wanted: &Wanted<'_>, part: &mut Part, hashed: &Hashed) -> 
         .map_err(IoError::on("create the folder"))
         .in_file(folder)?;
     if !wanted.replace && path.symlink_metadata().is_ok() && Hashed::of(path)? != *hashed {
-        let problem = format!("{} bytes arrived under its name", hashed.bytes);
+        let problem = format!("the received file has {} bytes", hashed.bytes);
         return Err(FetchError::Conflict { problem }).in_file(path);
     }
     sync_file(part.path())?;

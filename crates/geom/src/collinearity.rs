@@ -13,7 +13,7 @@ use areograph_base::error::Cause;
 #[error(
     "the ground point lies {depth_m:.1} m along the boresight; expected a point in front of the camera"
 )]
-#[cause(Input: "check that the point belongs to this image and that positions and angles are in metres and radians")]
+#[cause(Input: "check that the point belongs to this image and that positions are in metres and angles in radians")]
 pub struct BehindCamera {
     /// Component of the point along the boresight, metres; not positive, or not a number.
     pub depth_m: f64,

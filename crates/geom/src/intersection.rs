@@ -15,18 +15,18 @@ const STEP_M: f64 = 1e-4;
 /// Largest condition number of the normal matrix with unit diagonal.
 const CONDITION_MAX: f64 = 1e12;
 
-/// The unit in which the measuring error is the same for all images.
+/// Unit in which the measurement error is the same for all images.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Weighting {
-    /// Standard deviation of both focal coordinates.
+    /// Standard deviation of both focal-plane coordinates.
     Focal {
         /// Pixels.
         #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
         sigma_px: f64,
     },
-    /// Standard deviations along the track in lines and across it in pixels.
+    /// Standard deviations along the track in lines and across the track in pixels.
     Line {
         /// Lines.
         #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
@@ -115,7 +115,7 @@ impl IntersectionLimits {
 #[serde(rename_all = "snake_case")]
 pub enum Unintersected {
     /// Fewer than two rays.
-    #[error("{rays} ray, expected at least two")]
+    #[error("number of rays: {rays}; expected at least two")]
     FewRays {
         /// Number of rays.
         rays: usize,

@@ -18,18 +18,18 @@ use areograph_base::{constants::SPEED_OF_LIGHT_M_S, time::Interval};
 /// Steps of the inverse of the aberration; each reduces the error to 1e-4.
 const STEPS: u32 = 4;
 
-/// Which positions of the camera the geometry uses: one convention for a whole run.
+/// Light-time convention: instant and observer to which camera positions refer; one convention for a whole run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum LightTime {
-    /// Position of the camera when the light left the ground: light time to the surface point and aberration.
+    /// Position of the camera when the light left the ground, with light time to the ground point and aberration.
     Surface,
-    /// Position when the line was exposed.
+    /// Position of the camera when the line was exposed.
     None,
-    /// Apparent position from the centre of Mars, with light time and aberration, as in ISIS and ALE.
+    /// Apparent position of the camera from the centre of the body, with light time and aberration, as in ISIS and ALE.
     Centre,
-    /// Position in the support data of an image; not a convention of a run.
+    /// Position of the camera in the support data of an image; not a convention of a run.
     Support,
 }
 

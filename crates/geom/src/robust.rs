@@ -4,20 +4,20 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How the weight of an observation falls with its normalised residual `z = v/σ`.
+/// Decrease of the weight of an observation with the normalised residual `z = v/σ`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(tag = "function", rename_all = "snake_case")]
 pub enum RobustWeight {
     /// `1` up to the limit, then `limit/|z|`.
     Huber {
-        /// Normalised residual from which the weight falls.
+        /// Normalised residual above which the weight decreases.
         #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
         limit: f64,
     },
     /// `1 / (1 + (z/limit)²)`.
     Cauchy {
-        /// Normalised residual with half the weight.
+        /// Normalised residual at which the weight is one half.
         #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
         limit: f64,
     },

@@ -37,7 +37,7 @@ pub fn unit_weight_limits(redundancy: f64) -> Option<[f64; 2]> {
     (redundancy >= 1.0).then(|| [root(-1.0), root(1.0)])
 }
 
-/// Statistics of a column; all 0 for an empty one.
+/// Statistics of a column; all 0 for an empty column.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 pub struct Summary {
@@ -166,14 +166,14 @@ const BLOCKS: usize = 10;
 /// Fewest residuals of a block.
 const BLOCK_MIN: usize = 10;
 
-/// Straight line through values, in most uses over time.
+/// Straight line fitted to values, usually over time.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 pub struct Trend {
-    /// Slope, unit of the values per unit of the abscissa (per second).
+    /// Slope, in the unit of the values per unit of the abscissa (per second).
     pub slope: f64,
-    /// Standard uncertainty of the slope from the scatter about the line, whose values need not be
-    /// independent of their neighbours.
+    /// Standard uncertainty of the slope, from the scatter about the line; neighbouring values may be
+    /// correlated.
     pub uncertainty: f64,
 }
 

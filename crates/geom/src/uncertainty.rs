@@ -18,13 +18,13 @@ use areograph_base::error::Cause;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 pub struct ResidualMoments {
-    /// Mean along the track, lines.
+    /// Mean residual along the track, lines.
     pub mean_x: f64,
-    /// Standard deviation along the track, lines.
+    /// Standard deviation of residuals along the track, lines.
     pub deviation_x: f64,
-    /// Mean across the track, pixels.
+    /// Mean residual across the track, pixels.
     pub mean_y: f64,
-    /// Standard deviation across the track, pixels.
+    /// Standard deviation of residuals across the track, pixels.
     pub deviation_y: f64,
 }
 
@@ -91,7 +91,7 @@ pub struct BudgetInput {
     pub height_over_base: f64,
 }
 
-/// Planimetric and height uncertainty from one reading of the across-track input.
+/// Planimetric and height uncertainty for one treatment of the across-track residuals.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 pub struct PointUncertainty {
@@ -99,20 +99,20 @@ pub struct PointUncertainty {
     pub across_px: f64,
     /// Planimetric uncertainty, eq. 8, pixels.
     pub planimetric_px: f64,
-    /// The same, metres.
+    /// Planimetric uncertainty, metres.
     pub planimetric_m: f64,
     /// Height uncertainty, eq. 9, pixels.
     pub height_px: f64,
-    /// The same, metres.
+    /// Height uncertainty, metres.
     pub height_m: f64,
 }
 
-/// The contribution of the ground points themselves along the track.
+/// Along-track contribution of the ground points.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum GroundPart {
-    /// The rest of the discrepancy of footprints, pixels.
+    /// Remainder of the footprint discrepancy, pixels.
     Resolved {
         /// Pixels.
         along_px: f64,
@@ -123,17 +123,17 @@ pub enum GroundPart {
     NotObserved,
 }
 
-/// The budget by equation 5, with signs.
+/// Budget from equation 5, with signs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 pub struct SignedBudget {
     /// Along-track discrepancy due to orientation, root mean square of `Δx1 − Δx2`, pixels.
     pub along_px: f64,
-    /// Mean misregistration of the footprints that the mean discrepancy does not explain, pixels; `None` where no
-    /// footprint is in both images. An error of a footprint in plan moves both projections alike and does not show.
+    /// Mean misregistration of the footprints that the mean discrepancy does not explain, pixels; missing where no
+    /// footprint is in both images. A planimetric footprint error moves both projections alike and is not visible.
     #[serde(default, skip_serializing_if = "areograph_base::stored::is_left_out")]
     pub unexplained_px: Option<f64>,
-    /// Eq. 8 and 9 with these discrepancies.
+    /// Point uncertainty, eq. 8 and 9, from these discrepancies.
     pub point: PointUncertainty,
 }
 
@@ -143,17 +143,17 @@ pub struct SignedBudget {
 pub struct UncertaintyBudget {
     /// Along-track discrepancy due to orientation, eq. 7, pixels.
     pub along_px: f64,
-    /// Observed along-track misregistration of the footprints, root mean square, pixels; `None` where no footprint is in
-    /// both images.
+    /// Observed along-track misregistration of the footprints, root mean square, pixels; missing where no footprint is
+    /// in both images.
     #[serde(default, skip_serializing_if = "areograph_base::stored::is_left_out")]
     pub total_along_px: Option<f64>,
-    /// Contribution of the footprints to it, eq. 6.
+    /// Contribution of the footprints to this misregistration, eq. 6.
     pub ground: GroundPart,
-    /// Eq. 8 and 9 with the average of the images' across-track residuals, as the paper computes.
+    /// Point uncertainty, eq. 8 and 9, with the average of the across-track residuals of both images, as in Shan et al. 2005.
     pub paper_average: PointUncertainty,
-    /// Eq. 8 and 9 with the sum of squares of both images, as in the paper's eq. 7.
+    /// Point uncertainty, eq. 8 and 9, with the sum of squares of both images, as in eq. 7 of Shan et al. 2005.
     pub equation_7: PointUncertainty,
-    /// The same by equation 5, where means of opposite sign add up.
+    /// Budget from equation 5, where means of opposite sign add up.
     pub equation_5: SignedBudget,
     /// Ground size of a pixel, metres.
     pub pixel_size_m: f64,
@@ -317,7 +317,7 @@ fn check(input: &BudgetInput) -> Result<(), BudgetError> {
         return Err(BudgetError::NoSites);
     }
     for (what, value) in [
-        ("the size of a pixel, metres,", input.pixel_size_m),
+        ("the pixel size in metres", input.pixel_size_m),
         ("height over base", input.height_over_base),
     ] {
         if !(value > 0.0 && value.is_finite()) {
@@ -340,11 +340,11 @@ fn check(input: &BudgetInput) -> Result<(), BudgetError> {
     let observed = input.misregistration.iter().map(|misregistration| {
         [
             (
-                "the misregistration of footprints, metres,",
+                "the mean misregistration of footprints in metres",
                 misregistration.mean_m,
             ),
             (
-                "the misregistration of footprints, metres,",
+                "the RMS misregistration of footprints in metres",
                 misregistration.rms_m,
             ),
         ]

@@ -63,7 +63,7 @@ pub fn read_ties(path: &Path) -> Result<Rows<ImageRow>> {
 /// # Errors
 /// As [`read_ties`].
 pub fn read_control(path: &Path) -> Result<Rows<ControlRow>> {
-    const COLUMNS: &str = "point, camera, line, sample, longitude_deg, latitude_deg, radius_m (a radius, as heights have a datum)";
+    const COLUMNS: &str = "point, camera, line, sample, longitude_deg, latitude_deg, radius_m (heights depend on a datum)";
     read_rows(path, EXAMPLE, |header| {
         let image = ImageColumns::of(header, COLUMNS)?;
         let place = columns(
@@ -84,7 +84,7 @@ pub fn read_control(path: &Path) -> Result<Rows<ControlRow>> {
             }
             if !(RADIUS_M[0]..=RADIUS_M[1]).contains(&values[2]) {
                 return Err(format!(
-                    "radius_m {}: expected a distance from the centre of the body, metres",
+                    "radius_m {}: expected the distance from the centre of the body in metres",
                     values[2]
                 ));
             }
@@ -149,7 +149,7 @@ fn deviations(
             let sigma = numbers(row, &[column])?[0];
             if !(sigma >= SIGMA_MIN && sigma <= largest) {
                 return Err(format!(
-                    "standard deviation {sigma}: expected one from {SIGMA_MIN} to {largest}"
+                    "standard deviation {sigma}: expected a number from {SIGMA_MIN} to {largest}"
                 ));
             }
             *deviation = Some(sigma);

@@ -60,7 +60,7 @@ impl SizedFile {
 /// A file that is larger than any of its kind.
 #[derive(Debug, thiserror::Error, Cause)]
 #[error("has {bytes} bytes; expected at most {bytes_max} for {kind}")]
-#[cause(Input: "name the right file, or fetch it again: this one is damaged or of a different kind")]
+#[cause(Input: "name the correct file, or fetch the file again: it is damaged or of a different kind")]
 struct TooLarge {
     bytes: u64,
     bytes_max: u64,

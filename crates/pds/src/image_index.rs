@@ -164,9 +164,9 @@ pub struct ImageIndex {
 
 /// A file that is not an index.
 #[derive(Debug, thiserror::Error, Cause)]
-#[cause(Input: "give cumindex.tab (or imgindex.tab) of a volume of the archive, its .lbl beside it")]
+#[cause(Input: "give cumindex.tab (or imgindex.tab) of an archive volume, with its .lbl beside it")]
 enum NoIndex {
-    #[error("the label has no column {0}")]
+    #[error("the label does not define the column {0}")]
     Column(&'static str),
     #[error("no row describes an image; line {line}: {text}")]
     Rows { line: u64, text: String },
@@ -290,7 +290,8 @@ fn image(fields: &Fields<'_>) -> std::result::Result<IndexedImage, String> {
         value.ok_or_else(|| format!("{key} is {:?}; expected a count from 1", text(key)))
     };
     let positive = |key: &str| number(key).filter(|value| *value > 0.0);
-    let product_id = known("PRODUCT_ID").ok_or("PRODUCT_ID is empty; expected a product")?;
+    let product_id =
+        known("PRODUCT_ID").ok_or("PRODUCT_ID is empty; expected a product identifier")?;
     let size = [count("LINE_SAMPLES")?, count("LINES")?];
     let pixel_m = positive("SCALED_PIXEL_WIDTH");
     let line_m = pixel_m.map(|width_m| width_m * positive("PIXEL_ASPECT_RATIO").unwrap_or(1.0));

@@ -34,7 +34,7 @@ const CLOCK_KEY_DAMAGE: usize = 2;
 pub(super) fn damage(label: &Label, has_clock: bool) -> Vec<String> {
     let unread = label.unread.iter().map(|unread| {
         format!(
-            "line {} of the label is not KEY = value: {:?}",
+            "line {} of the label does not have the form KEY = value: {:?}",
             unread.line, unread.text
         )
     });
@@ -48,7 +48,7 @@ pub(super) fn damage(label: &Label, has_clock: bool) -> Vec<String> {
     if !has_clock && (resembling.is_some() || !remarks.is_empty()) {
         let instead = resembling.map_or_else(String::new, |entry| format!(", but {}", entry.key));
         remarks.push(format!(
-            "the damaged label states no {CLOCK_KEY}{instead}: without the key sclk_start the start is taken from \
+            "the damaged label states no {CLOCK_KEY}{instead}: without the key sclk_start, the start time is taken from \
              START_TIME, which is truncated to 10 ms"
         ));
     }
@@ -120,7 +120,7 @@ pub(super) fn as_taken(label: &Label) -> Result<(), LabelError> {
         Some(entry) => Err(other_image(
             "OBJECT",
             &entry.group,
-            "the image as taken by the camera, with no map projection",
+            "the image as taken by the camera, without a map projection",
         )),
         None => Ok(()),
     }

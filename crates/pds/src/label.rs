@@ -89,7 +89,7 @@ pub enum LabelError {
     NoEnd,
     /// Two values under one keyword.
     #[error("{key} appears in the label as {first:?} and as {second:?}; expected one value")]
-    #[cause("determine which of the two values is correct, and keep only that one in the label")]
+    #[cause("determine the correct value, and keep only this value in the label")]
     Twice {
         /// The keyword.
         key: String,
@@ -101,7 +101,7 @@ pub enum LabelError {
     /// An image of another mission or target, or one that is map-projected.
     #[error("{key} is {value:?}; expected {expected}")]
     #[cause(
-        "give the label of an image of Mars that the camera's spacecraft took, without a map projection"
+        "give the label of an unprojected image of Mars that was taken by the camera's spacecraft"
     )]
     OtherImage {
         /// The keyword.

@@ -159,7 +159,7 @@ mod tests {
             ),
             (
                 "OBJECT = IMAGE_MAP_PROJECTION\nMAP_SCALE = 1\nEND_OBJECT",
-                "OBJECT is \"IMAGE_MAP_PROJECTION\"; expected the image as taken by the camera, with no \
+                "OBJECT is \"IMAGE_MAP_PROJECTION\"; expected the image as taken by the camera, without a \
                  map projection",
             ),
             (

@@ -64,7 +64,7 @@ enum OtherKind {
 pub enum PixelFileError {
     /// A value of a label.
     #[error("{key} is {value:?}; expected {expected}")]
-    #[cause("give a cube of one band as ISIS writes it, with the pixels in the file")]
+    #[cause("give an ISIS cube with one band and with the pixels in the same file")]
     Value {
         /// The keyword.
         key: &'static str,
@@ -75,7 +75,7 @@ pub enum PixelFileError {
     },
     /// A cube whose pixels end before their last line.
     #[error("the file has {found} bytes; expected {expected}, as its label states")]
-    #[cause("fetch or write the cube again: it is truncated")]
+    #[cause("fetch or regenerate the cube: it is truncated")]
     Short {
         /// Bytes of the file.
         found: u64,
@@ -85,8 +85,8 @@ pub enum PixelFileError {
     /// A picture that its library rejects, or of a different kind.
     #[error("{format}: {reason}")]
     #[cause(
-        "give a whole picture of one band of grey with 8, 16 or 32 bits a pixel, a TIFF without compression, with LZW \
-         or with deflate"
+        "give a complete greyscale picture of one band with 8, 16 or 32 bits per pixel; a TIFF is uncompressed, or has LZW \
+         or deflate compression"
     )]
     Picture {
         /// Its format.

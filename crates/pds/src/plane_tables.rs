@@ -191,7 +191,7 @@ pub fn read_controls(path: &Path) -> Result<Rows<ControlRow>> {
 /// # Errors
 /// As [`read_measurements`].
 pub fn read_pictures(path: &Path) -> Result<Rows<PictureRow>> {
-    const COLUMNS: &str = "picture, and where known brick and metres_per_unit";
+    const COLUMNS: &str = "picture, and optionally brick and metres_per_unit";
     read_rows(path, EXAMPLE, |header| {
         let [picture] = columns(header, ["picture"], COLUMNS)?;
         let place = |name: &str| header.iter().position(|column_name| column_name == name);

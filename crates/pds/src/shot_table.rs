@@ -142,7 +142,7 @@ pub struct RowComplaint {
 #[cause(Input)]
 enum ShotTableError {
     #[error("no column is called \"{name}\" (shots.columns.{key}); the first row has {}", found.join(", "))]
-    #[cause("write the name of the column as in the table, or its number, from 1")]
+    #[cause("give the column name as in the table, or the column number, counted from 1")]
     Column {
         key: &'static str,
         name: String,
@@ -150,8 +150,8 @@ enum ShotTableError {
     },
     #[error("line 1: column {column} is \"{found}\"; expected {}", expected.join(" or "))]
     #[cause(
-        "give a table of the MOLA PEDR query of the Orbital Data Explorer with the heading that the service writes, or leave \
-         out the layout and assign the columns in shots.columns"
+        "give a table of the MOLA PEDR query of the Orbital Data Explorer with the heading that the service writes, or omit \
+         the layout and assign the columns in shots.columns"
     )]
     Heading {
         column: usize,
@@ -377,7 +377,7 @@ fn agrees(
         return Ok(());
     }
     Err(format!(
-        "the range is {:.0} m; expected the distance of spacecraft and footprint, {distance_m:.0} m, within {limit_m:.0} m",
+        "the range is {:.0} m; expected the distance between spacecraft and footprint, {distance_m:.0} m, within {limit_m:.0} m",
         row.range_m
     ))
 }

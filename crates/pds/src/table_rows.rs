@@ -52,7 +52,7 @@ impl Cause for Refused {
     fn advice(&self) -> String {
         match self.error {
             TableError::Unit { .. } => {
-                "give the coordinates in one of these units, which the column name states"
+                "give the coordinates in one of these units, and state the unit in the column name"
                     .to_owned()
             }
             _ => format!(

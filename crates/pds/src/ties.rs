@@ -52,9 +52,7 @@ enum TieError {
          pixel"
     )]
     Column(&'static str),
-    #[error(
-        "column {0} is missing; a table has both of line_sigma_px and sample_sigma_px, or neither"
-    )]
+    #[error("column {0} is missing; expected both line_sigma_px and sample_sigma_px, or neither")]
     #[cause(like = Column)]
     Sigma(&'static str),
     #[error("the table cannot be read: {0}")]
@@ -171,7 +169,7 @@ fn sigmas(written: [Option<&str>; 2]) -> std::result::Result<Option<[f64; 2]>, S
     }
     let [line, sample] = written.map(|text| text.unwrap_or("missing"));
     Err(format!(
-        "standard deviations of line {line}, of sample {sample}: expected two numbers above 0, or neither"
+        "standard deviations {line} (line) and {sample} (sample): expected two numbers above 0, or no values"
     ))
 }
 
@@ -331,11 +329,11 @@ mod tests {
             .iter()
             .map(|complaint| &*complaint.text)
             .collect();
-        let expected = "expected two numbers above 0, or neither";
+        let expected = "expected two numbers above 0, or no values";
         assert_eq!(
             texts,
             [("0.3", "missing"), ("0", "0.2")].map(|(line, sample)| format!(
-                "standard deviations of line {line}, of sample {sample}: {expected}"
+                "standard deviations {line} (line) and {sample} (sample): {expected}"
             ))
         );
         assert_eq!(

@@ -25,7 +25,7 @@ pub enum ProductError {
     /// The file differs from what was written.
     #[error("read back differently: {what}")]
     #[cause(
-        "check the disk and run again; if it happens again, report it with the site's configuration"
+        "check the disk and run again; if the error persists, report it with the site's configuration"
     )]
     ReadBack {
         /// The difference.

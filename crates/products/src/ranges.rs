@@ -125,7 +125,7 @@ struct SiteSummary {
 struct SimultaneousImage<'a> {
     /// Image identifier.
     image: &'a str,
-    /// Shots of the profile fired while the image was exposed.
+    /// Number of shots of the profile that were fired while the image was exposed.
     shots: u32,
 }
 
@@ -140,7 +140,7 @@ struct ProfileDocument<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     solar_longitude_deg: Option<f64>,
     simultaneous: Vec<SimultaneousImage<'a>>,
-    /// Whether it has enough shots to be compared with the limits.
+    /// Whether the profile has enough shots for a comparison with the limits.
     judged: bool,
     valid: bool,
     invalid_because: &'a [String],

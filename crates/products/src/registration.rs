@@ -84,7 +84,7 @@ struct Configured {
     model: Option<CameraModel>,
     /// Convergence limit of the published iterations.
     tolerance_lines: f64,
-    /// Maximum number of steps of these iterations.
+    /// Maximum number of steps of the published iterations.
     steps_max: u32,
 }
 

@@ -101,7 +101,8 @@ fn overview(adjusted: &Adjusted) -> Markup {
             p {
                 "Tie points scatter by " (of(&label(summary.tie_scatter_px, 2), "/tie_scatter_px"))
                 " px along the track in addition to their stated σ, as expected from attitude \
-                 jitter. The σ of the adjustment include this scatter, and 1.4 times as much (at most 1.5 px) across the track, where residuals do not show it."
+                 jitter. The σ of the adjustment include this scatter along the track and 1.4 times as much (at most 1.5 px) \
+                 across the track, where residuals do not reveal it."
             }
         }
     }
@@ -197,8 +198,8 @@ fn observations(summary: &AdjustmentSummary, terms: &Terms<'_>) -> Markup {
         );
     }
     let words = format!(
-        "Variance component: √(vᵀPv / redundancy), 1 where the a priori σ is right; by chance: its 99 % interval, lower for \
-         heights with robust weights. Beyond {BAARDA_LIMIT}: failed Baarda's test, by chance 1 in 1000."
+        "Variance component: √(vᵀPv / redundancy), 1 where the a priori σ is correct; by chance: 99 % interval of the \
+         component, lower for heights with robust weights. Beyond {BAARDA_LIMIT}: Baarda's test failed, by chance 1 in 1000."
     );
     html! { (table.finish()) p { (words) } (outside(summary, terms)) }
 }
@@ -219,12 +220,12 @@ fn outside(summary: &AdjustmentSummary, terms: &Terms<'_>) -> Markup {
     let sentences = [
         (
             listed(TypeSummary::is_above_chance),
-            "Above their interval, so that a priori standard deviations are too small",
+            "Above their interval (a priori standard deviations too small)",
         ),
         (
             listed(TypeSummary::is_below_chance),
-            "Below their interval, so that a priori standard deviations are larger than the scatter, or robust weights reduce \
-             it; covariances are not reduced",
+            "Below their interval (a priori standard deviations larger than the scatter, or robust weights; covariances are not \
+             reduced)",
         ),
     ];
     html! {

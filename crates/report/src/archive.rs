@@ -61,8 +61,8 @@ fn lead(ranges: &ArchiveRanges, judgement: &Judgement) -> Markup {
         counted(ranges.files.len(), "file"),
     );
     let words = format!(
-        "{} shots were checked: measured range minus distance from the spacecraft (kernels) to the footprint, time tags \
-         corrected by {} s. A profile is the shots of one file in one revolution.",
+        "{} shots were checked: measured range minus distance from the spacecraft (kernels) to the footprint, with time \
+         tags corrected by {} s. A profile consists of the shots of one file in one revolution.",
         grouped(ranges.sum(|file| file.shots)),
         label(ranges.clock.correction_s(), 3),
     );
@@ -125,7 +125,7 @@ fn over_time(ranges: &ArchiveRanges) -> Result<Markup> {
     };
     let ranges_plot = Plot::of(
         "Ranges over time".to_owned(),
-        "Mean of range − distance without outliers, and its robust spread, of every profile. Dashed: limits."
+        "Mean of range − distance without outliers, and its robust spread, for every profile. Dashed: limits."
             .to_owned()
             + &thinning,
         "days since the first profile",
@@ -136,7 +136,7 @@ fn over_time(ranges: &ArchiveRanges) -> Result<Markup> {
     );
     let orbits_plot = Plot::of(
         "Orbits over time".to_owned(),
-        "Mean spacecraft position of the file minus the position in the kernels.".to_owned(),
+        "Mean difference of spacecraft positions, file minus kernels.".to_owned(),
         "days since the first profile",
         vec![
             panel("up, m", |of| of.spacecraft_m[0], Some(limits.orbit_max_m)),
@@ -158,9 +158,8 @@ fn over_time(ranges: &ArchiveRanges) -> Result<Markup> {
     let scan_plot = Plot::of(
         "Clock correction over time".to_owned(),
         format!(
-            "Correction of time tags that minimises the spread of a profile's ranges, with raw radii or with radii \
-             corrected by crossovers, where the correction is known to {KNOWN_S} s; the horizontal line is the correction \
-             used, {} s.",
+            "Time-tag correction that minimises the spread of the ranges of a profile, with raw or crossover-corrected radii; \
+             drawn where the uncertainty is below {KNOWN_S} s. The horizontal line is the correction used, {} s.",
             label(used_s, 3)
         ),
         "days since the first profile",
@@ -275,10 +274,10 @@ fn map(ranges: &ArchiveRanges, worst: &[WorstProfile<'_>]) -> Result<Markup> {
 fn not_checked(ranges: &ArchiveRanges) -> Markup {
     let [without, partly] = ranges.not_covered();
     let coverage = if without + partly == 0 {
-        "The kernels have a position for every shot.".to_owned()
+        "The kernels contain a position for every shot.".to_owned()
     } else {
         format!(
-            "The kernels have no position for {} shots: {without} profiles could not be checked, {partly} only in \
+            "The kernels contain no position for {} shots: {without} profiles could not be checked, {partly} only in \
              part. In profiles.parquet their not_covered is above 0.",
             grouped(ranges.sum(|file| file.not_covered))
         )
@@ -301,13 +300,13 @@ fn not_checked(ranges: &ArchiveRanges) -> Markup {
     html! {
         p { (coverage) }
         @if !ranges.failures.is_empty() {
-            p { "Not read, or not read again, " (ranges.failures.len()) " in all:" }
+            p { "Files not read, or not read again, " (ranges.failures.len()) " in all:" }
             ul {
                 @for failure in ranges.failures.iter().take(LISTED) { li { (failure.file) ": " (failure.why) } }
             }
         }
         @if !complaints.is_empty() {
-            p { "Records inconsistent internally or with neighbours were rejected:" }
+            p { "Records that are inconsistent internally or with neighbours were rejected:" }
             ul {
                 @for found in complaints {
                     li {
@@ -323,7 +322,7 @@ fn not_checked(ranges: &ArchiveRanges) -> Markup {
 
 fn how(ranges: &ArchiveRanges) -> Markup {
     let positions = format!(
-        "Positions are interpolated by Chebyshev polynomials within {TRAJECTORY_TOLERANCE_M} m of CSPICE; the \
+        "Positions are interpolated with Chebyshev polynomials to within {TRAJECTORY_TOLERANCE_M} m of CSPICE; the \
          largest difference at independent instants is {:.1e} m. States are geometric.",
         ranges.trajectory_error_m()
     );

@@ -32,7 +32,7 @@ pub fn calibration_page(config: &CalibrationConfig, of: &Calibration) -> Result<
     let sections = [
         Section::new("From step to step", steps(of)),
         Section::new("Residuals", residuals(of)?),
-        Section::new("Not determined by ties", sight(of)),
+        Section::new("Not determined by tie points", sight(of)),
         Section::new("The lines of the camera", cameras(of)),
         Section::new("Other orbits", validation(of)),
     ];
@@ -54,8 +54,8 @@ fn lead(config: &CalibrationConfig, of: &Calibration) -> Markup {
     let mode = match config.solution.mode {
         CalibrationMode::Differential => "",
         CalibrationMode::AsPublished => {
-            " All angles were estimated from ties only, as published, which can displace the camera by large \
-             amounts: see the figures after the ties."
+            " All angles were estimated from tie points only, as published, which can displace the camera by large \
+             amounts: see the figures after step ties."
         }
     };
     let mut words = accuracy + mode;
@@ -75,9 +75,9 @@ fn stated(of: &HeldBack) -> String {
     let times =
         |of: Option<Scattered>| of.map_or_else(|| "–".to_owned(), |of| format!("{:.2}", of.sigmas));
     format!(
-        "A tie point is known to {} in the plane and {} in height (root mean square). Validation by {}, withheld: they \
-         differ by {} times the expected amount in the plane and {} times in height, the {} of them in two lines or more by {} in the \
-         plane and {} in height, including the laser's own errors.",
+        "A tie point is known to {} in the plane and {} in height (root mean square). Validation by {}, withheld: \
+         differences are {} times the expected amount in the plane and {} times in height; for the {} points in two lines or \
+         more, they are {} in the plane and {} in height, including laser errors.",
         metres(of.accuracy_plane_m),
         metres(of.accuracy_height_m),
         counted(
@@ -128,7 +128,7 @@ fn control_cells(of: &ControlFigures) -> [Cell; 3] {
 
 fn steps(of: &Calibration) -> Markup {
     let mut table = Table::new(
-        "Root mean squares, as in table 5 of Li et al. 2023; of ties the worst line, of control line by line",
+        "Root mean squares, as in table 5 of Li et al. 2023: tie points in the worst line, control line by line",
         &[
             Column::Text("after"),
             Column::Text("control"),
@@ -190,7 +190,7 @@ fn residuals(of: &Calibration) -> Result<Markup> {
     ];
     let plot = Plot::of(
         "Residuals across the flight".to_owned(),
-        "Projected minus measured position. Ties show inter-line error; withheld laser points show absolute error."
+        "Projected minus measured position. Tie points show inter-line error; withheld laser points show absolute error."
             .to_owned(),
         "line",
         panels.into_iter().flatten().collect(),
@@ -201,14 +201,14 @@ fn residuals(of: &Calibration) -> Result<Markup> {
 fn sight(of: &Calibration) -> Markup {
     let unseen = usize::try_from(of.tie_sight.unseen).unwrap_or(usize::MAX);
     let words = format!(
-        "Of {} angles of the lines, ties leave {} undetermined: {}. They are constrained by a priori values; an \
-         adjustment without these constraints leaves them arbitrary.",
+        "Of {} offset angles, tie points leave {} undetermined: {}. A priori values constrain these combinations; \
+         without these constraints, an adjustment leaves them arbitrary.",
         3 * of.cameras.len(),
         counted(unseen, "combination"),
         of.tie_sight.unseen_words()
     );
     let mut table = Table::new(
-        "Combinations of the offset angles by ties only, the least determined first",
+        "Combinations of the offset angles from tie points only, least determined first",
         &[
             Column::Text("combination, with components"),
             Column::Number("standard deviation, °"),
@@ -235,14 +235,14 @@ fn on_ground(of: &Calibration) -> Markup {
         .and_then(|tie_ground| Some((tie_ground, tie_ground.limit_m?)))
     else {
         return paragraph(
-            "Ties do not reveal errors of measurement along the flight, and their heights were not tested.",
+            "Tie points do not reveal measurement errors along the flight, and their heights were not tested.",
         );
     };
     paragraph(&format!(
-        "Ties do not reveal errors of measurement along the flight, which change heights. The heights of {} tie \
+        "Tie points do not reveal measurement errors along the flight, which change heights. The heights of {} tie \
          points were \
-         compared with the ground between laser points. Those farther from it than {limit_m:.0} m (median of {:.1} standard \
-         deviations) were left out; smaller errors are not identified.",
+         compared with the ground between laser points. Tie points farther than {limit_m:.0} m from this ground (median of {:.1} \
+         standard deviations) were rejected; smaller errors are not identified.",
         ground.tested, ground.limit_sigmas
     ))
 }
@@ -255,13 +255,13 @@ fn significant(value: f64) -> String {
 
 fn cameras(of: &Calibration) -> Markup {
     let mut table = Table::new(
-        "Offset angles with standard deviations, and what the calibration changes",
+        "Offset angles with standard deviations, and the effect of the calibration",
         &[
             Column::Text("line"),
             Column::Number("φ (roll), °"),
             Column::Number("ω (pitch), °"),
             Column::Number("κ (yaw), °"),
-            Column::Number("moves the image by, px"),
+            Column::Number("image displacement, px"),
             Column::Number("support data residual, px"),
         ],
     );
@@ -289,8 +289,8 @@ fn cameras(of: &Calibration) -> Markup {
     });
     let words = format!(
         "Offset angles, constant look-angle terms and constant orbit errors are nearly indistinguishable, so their individual σ \
-         are large; their combined effect is far better known. The orbit drifts by {} m per line along the body-fixed X, Y, Z. \
-         Support data describe a straight line of equal samples; the last column states their residual.",
+         are large; their combined effect is far better known. The orbit drifts by {} m per image line along body-fixed X, Y, Z. \
+         Support data describe a straight line of equal samples; the last column states the residual of this description.",
         drift.join(", ")
     );
     html! { (table.finish()) p { (words) } }
@@ -346,8 +346,7 @@ fn offsets(of: &Calibration) -> Markup {
             table.row(true, cells);
         }
     }
-    let words = "The σ of the mean contains measurement and laser. The limit allows for constant errors of the \
-                 orbits. An \
-                 error common to the laser points of all orbits, such as another reference sphere, is not tested.";
+    let words = "The σ of the mean contains measurement and laser errors. The limit allows for constant orbit errors. An \
+                 error common to the laser points of all orbits, such as a different reference sphere, is not tested.";
     html! { (table.finish()) p { (words) } }
 }

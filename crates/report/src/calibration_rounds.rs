@@ -14,10 +14,10 @@ use areograph_stages::calibrate::{CalibrationRound, CameraResult, Rounds, Scatte
 /// A plot that cannot be drawn, which is a bug in areograph.
 pub(super) fn rounds(of: &Rounds, cameras: &[CameraResult]) -> Result<Markup> {
     let words = format!(
-        "A round measures tie points, makes the lines consistent with them, matches a terrain model with cells of {} m to the laser, \
-         and calibrates with both; the next round starts from its cameras. Rounds end when half of the units are \
-         shifted by less than \
-         half a cell and residuals of control change by less than 2 %, after {} at most.",
+        "A round measures tie points, makes the lines consistent with them, and matches a terrain model with cells of {} m to \
+         the laser. Tie points and laser points then calibrate the cameras from which the next round starts. Rounds end when \
+         half of the units are shifted by less than half a cell and control residuals change by less than 2 %, or after {} \
+         rounds.",
         label(of.cell_m, 0),
         of.rounds_max
     );
@@ -32,14 +32,14 @@ fn text(value: Option<f64>, decimals: usize) -> Cell {
 
 fn numbers(of: &Rounds) -> Markup {
     let mut table = Table::new(
-        "Every round; control and ties as root mean squares, of ties the worst line",
+        "All rounds: root mean square residuals of control, and of tie points in the worst line",
         &[
             Column::Number("round"),
             Column::Number("ties"),
             Column::Number("ties, px"),
             Column::Number("units kept"),
             Column::Number("units rejected"),
-            Column::Number("units shifted by (median), cells"),
+            Column::Number("shift of units (median), cells"),
             Column::Number("model − laser (median), m"),
             Column::Number("control, px"),
             Column::Number("withheld control, px"),
@@ -107,7 +107,7 @@ fn plot(of: &Rounds) -> Result<Markup> {
         Panel::of(
             "units shifted, cells",
             vec![Series::dots(
-                "median of units that calibrate",
+                "median of the units used as control",
                 0,
                 dots(&|round| Some(round.shift_cells)),
             )],
@@ -122,7 +122,7 @@ fn plot(of: &Rounds) -> Result<Markup> {
     ];
     let plot = Plot::of(
         "From round to round".to_owned(),
-        "Offset of a round's terrain model from the laser before its calibration, and residuals of control after it."
+        "Offset of the terrain model from the laser before the calibration of a round, and control residuals after it."
             .to_owned(),
         "round",
         panels,

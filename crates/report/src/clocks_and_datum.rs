@@ -26,10 +26,10 @@ fn biases(site: &SiteProducts) -> Markup {
     let terms = site.config.terms();
     let body = terms.body();
     let scope = match clock.scope {
-        BiasScope::SpkLookup => "the spacecraft's position in the range check".to_owned(),
+        BiasScope::SpkLookup => "the spacecraft position in the range check".to_owned(),
         BiasScope::Rotation => format!("the rotation of {body} into {}", terms.short_frame()),
         BiasScope::Both => {
-            format!("the spacecraft's position in the range check and the rotation of {body}")
+            format!("the spacecraft position in the range check and the rotation of {body}")
         }
         BiasScope::None => "nothing (switched off)".to_owned(),
     };
@@ -54,7 +54,7 @@ fn biases(site: &SiteProducts) -> Markup {
                 name.into(),
                 signed(of.bias.seconds(), 3).into(),
                 format!(
-                    "the time at which attitude is read; position and {body} stay at the exposure"
+                    "the time at which the attitude is read; position and {body} remain at the time of exposure"
                 )
                 .into(),
                 of.source.into(),
@@ -74,7 +74,7 @@ fn biases(site: &SiteProducts) -> Markup {
             [
                 format!("attitude and line times of {named}").into(),
                 "–".into(),
-                "nothing is applied to support data".into(),
+                "no correction of support data".into(),
                 "the files under Support data".into(),
             ],
         );
@@ -103,7 +103,7 @@ const fn datum_columns(file: &'static str) -> [Column; 8] {
         Column::Text("done"),
         Column::Number("shots"),
         Column::Number("mean shift, m"),
-        Column::Number("mean change of longitude, degrees"),
+        Column::Number("mean longitude change, degrees"),
     ]
 }
 
@@ -113,7 +113,7 @@ fn datum(site: &SiteProducts) -> Markup {
     }
     let decided = match site.config.pedr.datum {
         _ if !site.config.shots.is_empty() => "from the configuration of the tables".to_owned(),
-        DatumChoice::Auto => "from version letter and label".to_owned(),
+        DatumChoice::Auto => "from the version letter and the label".to_owned(),
         DatumChoice::Stated(datum) => format!("stated in the configuration: {datum}"),
     };
     let (sort, columns) = if site.config.shots.is_empty() {
@@ -148,7 +148,7 @@ fn datum(site: &SiteProducts) -> Markup {
     }
     let choice = site.footprints.ground_choice();
     let radii = choice.map_or_else(String::new, |of| {
-        format!(" Radii of the ground are those {}.", of.words())
+        format!(" Products use ground radii {}.", of.words())
     });
     let words = format!(
         "Datum {decided}; products are in {}, W0 = {:.3}°.{radii}",

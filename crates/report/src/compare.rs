@@ -76,7 +76,7 @@ fn lead(comparison: &KernelComparison) -> Markup {
         (Tone::Remarks, headline)
     } else if !close.is_empty() {
         let headline = format!(
-            "Not decided: {} ({} m) and {} are about equally far from the mean orbit.",
+            "Not decided: {} ({} m) and {} are nearly equally far from the mean orbit.",
             closest.set,
             label(closest.size.rms, 3),
             close.join(" and ")
@@ -84,7 +84,7 @@ fn lead(comparison: &KernelComparison) -> Markup {
         (Tone::Remarks, headline)
     } else if orbit.tied.is_empty() {
         let headline = format!(
-            "Of {} kernel sets {} is closest to the mean orbit: {distance}{}.",
+            "Of {} kernel sets, {} is closest to the mean orbit: {distance}{}.",
             orbit.deviations.len(),
             closest.set,
             pulled.map_or_else(String::new, |far| format!(
@@ -105,14 +105,14 @@ fn lead(comparison: &KernelComparison) -> Markup {
     };
     let pulls = orbit.pulls_the_mean().map_or_else(String::new, |far| {
         format!(
-            "{} lies {} m from the mean, farther than all others, and biases it. ",
+            "{} lies {} m from the mean, farther than all others, and biases this mean. ",
             far.set,
             label(far.size.rms, 3)
         )
     });
     let words = format!(
         "{pulls}{} epochs from {} to {} UTC, equally spaced over the time that all sets cover. Geometric positions of {} \
-         relative to Mars, each set minus the mean of all, in the axes of the mean orbit. The rule follows Shan et al. \
+         relative to Mars, each set minus the mean of all sets, in the axes of the mean orbit. The rule follows Shan et al. \
          2005: least root mean square distance.",
         whole(orbit.epochs.len()),
         comparison.utc[0],
@@ -133,7 +133,7 @@ fn elsewhere(orbit: &Comparison) -> String {
     let others = stretches.iter().enumerate().filter_map(|(index, stretch)| {
         let (of, [least_m, own_m]) = orbit.closer_within(*stretch)?;
         Some(format!(
-            " In stretch {} of {} {} is closer ({} m, {} {} m).",
+            " In stretch {} of {}, {} is closer ({} m; {}: {} m).",
             index + 1,
             stretches.len(),
             of.set,
@@ -185,7 +185,7 @@ fn attitude(attitude: &AttitudeComparison) -> Result<Markup> {
 
 /// Deviations of the sets, then differences of each two, in units of `unit`.
 fn tables(comparison: &Comparison, columns: &'static [Column], unit: f64) -> Markup {
-    let caption = "Set minus mean of all: mean ± standard deviation";
+    let caption = "Set minus mean of all sets: mean ± standard deviation";
     let mut deviations = Table::new(caption, columns);
     for deviation in &comparison.deviations {
         deviations.row(true, cells(&deviation.set, &deviation.size, unit));
@@ -265,8 +265,8 @@ fn figures(
         };
         let begins_h = stretch.start.since(stretches[0].start) / SECONDS_PER_HOUR;
         let caption = format!(
-            "Each set minus the mean of all; the stretch begins {begins_h:.3} h after the first epoch. `areograph kernels compare \
-             --json` gives every epoch."
+            "Each set minus the mean of all sets; the stretch begins {begins_h:.3} h after the first epoch. \
+             `areograph kernels compare --json` reports every epoch."
         );
         plots.push(figure(&Plot::of(title, caption, over.x_label(), panels))?);
     }

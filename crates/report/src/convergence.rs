@@ -84,7 +84,7 @@ fn methods(site: &SiteProducts) -> Markup {
         }
     }
     let words = format!(
-        "Tolerance {} lines, at most {} steps. Frame first diverges where pixels are more than twice as long as wide.",
+        "Tolerance {} lines, at most {} steps. The frame-first method diverges where pixels are more than twice as long as wide.",
         site.config.registration.tolerance_lines, site.config.registration.steps_max
     );
     html! { (table.finish()) p { (words) } }
@@ -109,7 +109,7 @@ fn convergence_plot(image: &ImageProducts) -> Plot {
         Series::line(name(run), colour, logarithms.collect())
     });
     let words =
-        "Mean step of the footprints within the image's lines, 0 once converged.".to_owned();
+        "Mean step of the footprints within the image's lines; 0 after convergence.".to_owned();
     Plot::of(
         format!("Convergence on {}", image.times.id),
         words,

@@ -83,8 +83,8 @@ fn positions(site: &SiteProducts, adjusted: &Adjusted) -> Markup {
         (line_times(adjusted))
         @if starts_at_pedr {
             p {
-                "Relative to the orbit of the kernels; with a simultaneous profile the expected orbit is that of the shots \
-                 (adjustment.orbit_of_pedr)."
+                "Shifts are relative to the orbit in the kernels; with a simultaneous profile, the expected orbit is the orbit \
+                 of the shots (adjustment.orbit_of_pedr)."
             }
         }
     }
@@ -97,9 +97,9 @@ fn line_times(adjusted: &Adjusted) -> Markup {
     html! {
         @if largest_s > 0.0 {
             p {
-                "±: for the camera at the exposure of a line. Line times are known to ±"
+                "±: a posteriori σ of the camera at the exposure of a line. Line times are known to ±"
                 (label(largest_s / SECONDS_PER_MS, 0)) " ms; along the track they cannot be \
-                 separated from position and rotation, which are to be used together."
+                 separated from position and rotation, which must be used together."
             }
         }
     }
@@ -152,7 +152,7 @@ fn rotations(site: &SiteProducts, adjusted: &Adjusted) -> Markup {
     let inseparable = if adjusted.summary.correlated.is_empty() {
         ""
     } else {
-        " In a narrow field of view position and rotation are nearly indistinguishable."
+        " In a narrow field of view, position and rotation are nearly indistinguishable."
     };
     html! { (table.finish()) p { "±: a posteriori σ." (inseparable) } }
 }
@@ -160,9 +160,7 @@ fn rotations(site: &SiteProducts, adjusted: &Adjusted) -> Markup {
 /// Range residuals of the same shots with the orbit of the kernels and after the adjustment.
 fn ranges(site: &SiteProducts, adjusted: &Adjusted) -> Markup {
     if adjusted.ranges.is_empty() {
-        return paragraph(
-            "No shot was fired during an exposure, so that no range enters the adjustment.",
-        );
+        return paragraph("No shot was fired during an exposure, so the adjustment uses no range.");
     }
     let before_m = checked_ranges(site);
     let mut groups: BTreeMap<(&str, usize), [Vec<f64>; 2]> = BTreeMap::new();
@@ -176,7 +174,7 @@ fn ranges(site: &SiteProducts, adjusted: &Adjusted) -> Markup {
         after.push(range.residual_m.value);
     }
     let mut table = Table::new(
-        "Ranges of shots fired during an exposure, residuals in metres",
+        "Ranges of shots fired during an exposure: residuals in metres",
         &[
             Column::Text("profile"),
             Column::Text("image"),
@@ -221,8 +219,8 @@ fn attitude_clock(adjusted: &Adjusted) -> Markup {
     html! {
         @if let Some((offset_s, sigma_s)) = adjusted.attitude_clock_s {
             p {
-                "Offset of the attitude's clock, all images: " (label(offset_s, 3)) " ± " (label(sigma_s, 3))
-                " s; the rotations above include it."
+                "Offset of the attitude clock, all images: " (label(offset_s, 3)) " ± " (label(sigma_s, 3))
+                " s; the rotations above include this offset."
             }
         }
     }

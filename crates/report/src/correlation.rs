@@ -163,10 +163,10 @@ impl<'a> Matrix<'a> {
             )
         });
         let of = if self.has_line_times {
-            "Orientation of the camera at the exposure of its lines: line times, which are not unknowns of the \
-             adjustment, correlate coefficients of position; columns in the order of rows."
+            "Orientation of the camera at the exposure of the lines. Line times, which are not unknowns of the \
+             adjustment, correlate position coefficients. Columns are in the order of the rows."
         } else {
-            "Adjusted orientation unknowns; columns in the order of rows."
+            "Adjusted orientation unknowns. Columns are in the order of the rows."
         };
         format!("{of}{most}")
     }

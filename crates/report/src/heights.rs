@@ -97,7 +97,8 @@ fn statements(
             after.map_or_else(nothing, |after| {
                 format!("{after}; residuals {} σ", label(along, 2))
             }),
-            "agreement of the images along track; not a measure of height or position".to_owned(),
+            "agreement of the images along the track; not a measure of height or position"
+                .to_owned(),
         ],
         [
             format!("agreement with {altimeter}, height"),
@@ -137,9 +138,9 @@ fn statements(
 fn place_says(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> String {
     let (known, by) = (known_beforehand(geometric), place_by(geometric, adjustment));
     if known == by {
-        format!("a priori, not measured by images: from {known}")
+        format!("a priori, from {known}; not measured by images")
     } else {
-        format!("by {by}, not measured by images")
+        format!("from {by}; not measured by images")
     }
 }
 
@@ -150,10 +151,10 @@ pub(super) fn place_by(geometric: &GeometricProducts, adjustment: &AdjustmentPro
     let by_laser = matches!(adjusted.boresight, Some(Ok(_)));
     let also = [
         (by_relief, "relief"),
-        (by_laser, "the laser's mounting"),
+        (by_laser, "the laser mounting"),
         (
             adjusted.attitude_clock_s.is_some(),
-            "one offset of the attitude's clock",
+            "one attitude clock offset",
         ),
     ];
     let also: Vec<&str> = also
@@ -191,7 +192,7 @@ fn agreement_says(adjustment: &AdjustmentProducts, altimeter: &str) -> String {
     if adjustment.adjusted.heights.is_some() {
         "before: an independent test; after: fit of the adjustment to its control".to_owned()
     } else {
-        format!("a test of heights: the {altimeter} surface did not control them")
+        format!("an independent test: the {altimeter} surface did not control heights")
     }
 }
 
@@ -210,7 +211,7 @@ pub(super) fn absolute(
         } else {
             [
                 "a priori: no surface controls heights",
-                "a priori; ties.parquet has the standard deviations of single tie points",
+                "a priori; ties.parquet contains the standard deviations of single tie points",
             ]
         };
         return statements.map(str::to_owned);
@@ -225,7 +226,7 @@ pub(super) fn absolute(
         if is_open(geometric, adjustment) {
             format!("; open: {half}, because neither image is known to be correct")
         } else {
-            format!("; {half}, is within that")
+            format!("; {half}, is within these")
         }
     });
     [
@@ -282,9 +283,10 @@ fn surface_in_words(surface: &SurfaceFigures) -> Markup {
     html! {
         p {
             "Surface kriged from " (of(&whole(surface.shots), "shots")) " shots of "
-            (of(&counted(surface.profiles, "profile"), "profiles")) "; " (of(&label(surface.roughness_m, 1), "roughness_m"))
-            " m RMS over 300 m, slope " (of(&label(surface.slope, 3), "slope")) " per axis. Errors at \
-             neighbouring tie points are correlated, so averaging reduces them little."
+            (of(&counted(surface.profiles, "profile"), "profiles"))
+            "; roughness " (of(&label(surface.roughness_m, 1), "roughness_m")) " m RMS over 300 m, slope "
+            (of(&label(surface.slope, 3), "slope"))
+            " per axis. Errors at neighbouring tie points are correlated, so averaging hardly reduces them."
         }
     }
 }
@@ -300,7 +302,7 @@ fn compared(geometric: &GeometricProducts, altimeter: &str) -> Markup {
             Column::Number("1.48 MAD"),
             Column::Number("mean"),
             Column::Number("standard deviation"),
-            Column::Number("σ of the mean by the surface only"),
+            Column::Number("σ of the mean, surface only"),
         ],
     );
     let after = geometric
@@ -336,7 +338,7 @@ fn compared(geometric: &GeometricProducts, altimeter: &str) -> Markup {
 /// Heights of footprints that both images of a pair show.
 fn footprints(geometric: &GeometricProducts, altimeter: &str) -> Markup {
     let mut table = Table::new(
-        &format!("Heights of footprints by the images that show them, above {altimeter}, metres"),
+        &format!("Heights of footprints from the images that show them, above {altimeter}, metres"),
         &[
             Column::Text("adjustment"),
             Column::Text("pair"),
@@ -384,8 +386,8 @@ fn footprints(geometric: &GeometricProducts, altimeter: &str) -> Markup {
     if rows == 0 {
         return Markup::default();
     }
-    let words = "Relief between tie points affects single heights; where it has one sign along a profile, it affects \
-                 the median as well.";
+    let words = "Relief between tie points affects single heights; relief of one sign along a profile also affects \
+                 the median.";
     html! { (BeforeAfter::some_of_all(geometric)) (table.finish()) p { (words) } }
 }
 
@@ -404,7 +406,7 @@ fn apart(check: &HeightCheck) -> Markup {
         p {
             "At the tie points the surface interpolated from " (upper) " alone lies "
             (traced(&mean_m, "|adjustment.json#/before/heights/profiles_apart/mean_m"))
-            " m above that from " (lower) " alone (expected σ "
+            " m above the surface from " (lower) " alone (expected σ "
             (traced(&label(apart.sigma_m, 1), "adjustment.json#/before/heights/profiles_apart/sigma_m")) " m)."
         }
     }

@@ -48,7 +48,7 @@ fn write(site: &SiteProducts) -> Result<Markup> {
         (many::overview(site)?)
         (taken(site))
         (sky::figure(site)?)
-        (folded_unless(invalid, "Light time, polynomials of the orientation, and their residuals", &evidence))
+        (folded_unless(invalid, "Light time, orientation polynomials, and residuals", &evidence))
     })
 }
 
@@ -139,7 +139,7 @@ fn light_time(site: &SiteProducts) -> Markup {
         };
         if of_images().next().is_some() {
             words += &format!(
-                " With {word} the view shifts by {} m on the ground, and a ground point by {} lines.",
+                " With {word}, the view shifts by {} m on the ground, and a ground point by {} lines.",
                 span(|of| of.ground_m, 1),
                 span(|of| of.lines, 2)
             );
@@ -234,8 +234,8 @@ fn models(site: &SiteProducts) -> Markup {
         let (model, misfit) = (image.model, image.model.misfit);
         if model.model == CameraModel::Samples {
             words += &format!(
-                " Image {} uses no polynomial but an interpolation between its samples; halfway between them, this departs \
-                 by {:.4} m and {:.3}″ (RMS).",
+                " Image {} uses interpolation between its samples, not a polynomial; the interpolation error halfway \
+                 between samples is {:.4} m and {:.3}″ (RMS).",
                 image.times.id,
                 misfit.position_rmse_m,
                 misfit.pointing_rmse_rad / RADIANS_PER_ARCSECOND
@@ -344,7 +344,7 @@ fn words(image: &ImageProducts) -> String {
     text += &if model.pointing_ground_m.is_some() {
         format!(", {ground:.3} m on the ground.")
     } else {
-        "; the boresight leaves the ground.".to_owned()
+        "; the boresight misses the ground.".to_owned()
     };
     text
 }

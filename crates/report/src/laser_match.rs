@@ -42,11 +42,11 @@ fn lead(of: &LaserMatch) -> Markup {
         of.units.len()
     );
     let judged = of.held_out.as_ref().map_or_else(
-        || "No withheld shot validates it.".to_owned(),
+        || "No withheld shot validates the match.".to_owned(),
         |held_out| {
             format!(
-                "{}, withheld from every search, differ from the model by {:.1} m without the shift of their unit and by {:.1} m with \
-                 it (root mean square, the bias of the other shots removed).",
+                "{}, withheld from every search, differ from the model by {:.1} m without the shift of their unit and by {:.1} m \
+                 with this shift (root mean square, without the bias of the other shots).",
                 counted(held_out.shots, "shot"),
                 held_out.before_m,
                 held_out.after_m
@@ -61,14 +61,15 @@ fn lead(of: &LaserMatch) -> Markup {
     });
     let known = of.widened.map_or_else(String::new, |widened| {
         format!(
-            " Standard deviations are from leaving out single shots, multiplied by {:.1} for shifts and by {:.1} for biases to match the \
-             scatter of units about a plane.",
+            " Standard deviations from the omission of single shots are multiplied by {:.1} for shifts and by {:.1} for biases \
+             to match the scatter of units about a plane.",
             widened.shift, widened.bias
         )
     });
     let [east_m, north_m] = of.cell_m;
     let made = format!(
-        "{} in {}, {} of {} segments with relief, cells of {east_m:.1} by {north_m:.1} m, heights above {} m. The measure was {}.",
+        "{} in {}, {} of {} segments with relief, cells of {east_m:.1} by {north_m:.1} m, heights above a radius of {} m. \
+         The measure was {}.",
         counted(of.shots, "shot"),
         counted(of.tracks, "pass"),
         of.segments_kept,
@@ -109,12 +110,13 @@ fn map(of: &LaserMatch) -> Result<Markup> {
     let refused = refused.map(|unit| place_deg(of, unit)).collect();
     let dots = kept(of).map(|unit| place_deg(of, unit)).collect();
     let series = vec![
-        Series::dots("units that are not kept", GREY, refused),
-        Series::dots("units that are kept", 0, dots),
+        Series::dots("rejected units", GREY, refused),
+        Series::dots("kept units", 0, dots),
     ];
     let mut plot = Plot::of(
         "Shifts of the model".to_owned(),
-        "From the position of a unit by the laser towards its position in the model.".to_owned(),
+        "From the position of a unit according to the laser to its position in the model."
+            .to_owned(),
         "east longitude, degrees",
         vec![Panel::of("latitude, degrees", series)],
     );
@@ -153,7 +155,7 @@ fn held_out(of: &LaserMatch) -> Result<Markup> {
     ];
     let plot = Plot::of(
         "Model minus laser at withheld shots".to_owned(),
-        "Root mean square of every fourth shot of a kept unit, about the bias of its other shots."
+        "Root mean square of every fourth shot of a kept unit, without the bias of the other shots."
             .to_owned(),
         "unit",
         vec![Panel::of("root mean square, m", series)],
@@ -163,7 +165,7 @@ fn held_out(of: &LaserMatch) -> Result<Markup> {
 
 fn units(of: &LaserMatch) -> Markup {
     let mut table = Table::new(
-        "Every unit; shifts are offsets of the model from the laser",
+        "All units; shifts are offsets of the model from the laser",
         &[
             Column::Text("unit"),
             Column::Number("shots"),

@@ -5,7 +5,7 @@
 
 #![allow(
     clippy::format_push_string,
-    reason = "pages are put together once from small pieces"
+    reason = "pages are assembled once from small pieces"
 )]
 #![allow(
     clippy::cast_possible_truncation,

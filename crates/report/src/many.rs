@@ -59,7 +59,7 @@ pub(super) fn drawn_in_words(site: &SiteProducts) -> String {
         return String::new();
     }
     format!(
-        " Of {} images {} are drawn, and those with individual plots are named.",
+        " Of {} images, {} are drawn; images with individual plots are named.",
         whole(site.images.len()),
         whole(drawn(site).len())
     )
@@ -70,7 +70,7 @@ pub(super) fn some_of_all(site: &SiteProducts) -> Markup {
     html! {
         @if are_many(site) {
             p {
-                "Rows and plots are of " (IMAGES_SHOWN) " of " (whole(site.images.len())) " images, chosen under "
+                "Rows and plots show " (IMAGES_SHOWN) " of " (whole(site.images.len())) " images, chosen under "
                 (link("#exterior-orientation", "Exterior orientation")) "."
             }
         }
@@ -87,8 +87,8 @@ pub(super) fn overview(site: &SiteProducts) -> Result<Markup> {
         return Ok(Markup::default());
     }
     let words = format!(
-        "Rows and plots on this page are of {} of {} images: first those that are not valid, then those with the largest \
-         residuals. The files of every image have the same numbers, and this section summarises all images.",
+        "Rows and plots on this page show {} of {} images: first invalid images, then images with the largest residuals. \
+         The files of every image contain the same numbers, and this section summarises all images.",
         IMAGES_SHOWN,
         whole(site.images.len())
     );
@@ -219,7 +219,7 @@ fn plot(site: &SiteProducts, quantities: &[Quantity]) -> Plot {
             ..Panel::of(of.name, series)
         }
     });
-    let mut words = "Every image of the site, in the order of its configuration.".to_owned();
+    let mut words = "All images of the site, in the order of the configuration.".to_owned();
     if site.images.len() > POINTS {
         words += &format!(
             " The line shows 1 in {}.",
@@ -237,8 +237,7 @@ fn plot(site: &SiteProducts, quantities: &[Quantity]) -> Plot {
 /// Links to the file of every image.
 fn files(site: &SiteProducts) -> Markup {
     let ids = site.images.iter().map(|image| &image.times.id);
-    let words =
-        "Samples, polynomials and residuals of each image; registration.json has its footprints:";
+    let words = "Samples, polynomials and residuals of each image; registration.json contains the footprints:";
     let files = html! {
         p {
             (words)

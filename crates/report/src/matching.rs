@@ -45,7 +45,7 @@ fn some_of_all(all: &[MatchedPair], tabled: &[&MatchedPair]) -> Markup {
         @if tabled.len() < all.len() {
             p {
                 "The table lists " (tabled.len()) " of " (whole(all.len()))
-                " pairs: rejected pairs first, then those with the fewest tie points."
+                " pairs: rejected pairs first, then pairs with the fewest tie points."
             }
         }
     }
@@ -87,7 +87,7 @@ fn write(site: &SiteProducts, ties: &Ties) -> Markup {
     }
     html! {
         p {
-            "In each cell of common ground the point with the strongest texture was matched to the other image and back. \
+            "In each cell of common ground, the point with the strongest texture was matched to the other image and back. \
              σ: medians of \
              single matches, in the second image. The table shows the second pass, which starts from the adjusted orientation."
         }

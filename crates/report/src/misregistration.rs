@@ -74,7 +74,7 @@ fn read(geometric: &GeometricProducts) -> Markup {
     let adjusted = adjusted.map(|adjustment| adjustment.intersected.points.len().to_string());
     let counts = [
         (elsewhere, "measurements are in other images."),
-        (ties.ignored, "are marked to be ignored."),
+        (ties.ignored, "measurements are marked to be ignored."),
         (ties.complaint_count, "records could not be read."),
     ];
     html! {
@@ -82,9 +82,9 @@ fn read(geometric: &GeometricProducts) -> Markup {
             (traced(&counted(ties.points.len(), "tie point"), "adjustment.json#/ties/points")) " read, "
             (traced(&ties.multi_image().to_string(), "adjustment.json#/ties/multi_image")) " in two or more images; "
             (traced(&points.len().to_string(), "adjustment.json#/before/intersected"))
-            " intersect with the kernels' orientation"
+            " intersect with the orientation from the kernels"
             @if let Some(number) = adjusted {
-                ", " (traced(&number, "adjustment.json#/after/intersected")) " with the adjusted one."
+                ", " (traced(&number, "adjustment.json#/after/intersected")) " with the adjusted orientation."
             } @else {
                 "; the adjustment failed."
             }
@@ -113,9 +113,9 @@ fn rejected(geometric: &GeometricProducts) -> Markup {
             // The intersection has given the reason.
             RejectionReason::NotIntersected => continue,
             RejectionReason::Undetermined => "not determined",
-            RejectionReason::Blunder { .. } => "blunder: its standardised residual is too large",
+            RejectionReason::Blunder { .. } => "blunder: standardised residual too large",
             RejectionReason::Height { .. } => {
-                "blunder: no ground explains its height above the laser surface"
+                "blunder: relief does not explain the height above the laser surface"
             }
         };
         *reasons.entry(("adjustment", reason)).or_insert(0) += 1;
@@ -146,11 +146,11 @@ const fn rejection(reason: TieRejection) -> &'static str {
             Unintersected::Height { .. } => "rays meet far from the ellipsoid",
             Unintersected::NotConverged => "the iteration did not converge",
         },
-        TieRejection::Unseen => "an image does not see the intersected point",
+        TieRejection::Unseen => "an image does not show the intersected point",
         TieRejection::Duplicate => "duplicate identifier",
         TieRejection::TwiceInImage => "measured twice in one image",
         TieRejection::OutsideImage => "measured outside its image",
-        TieRejection::NotFinite => "measurement not a finite number",
+        TieRejection::NotFinite => "measurement is not a finite number",
     }
 }
 
@@ -224,13 +224,13 @@ fn reprojection(pairs: &[BeforeAfter]) -> Markup {
             table.row_of(&pair.place(state), true, cells);
         }
     }
-    let words = "Measured minus projected: M mean, σ standard deviation; x along track, y across (against the samples).";
+    let words = "Measured minus projected: M mean, σ standard deviation; x along track, y across (opposite to the samples).";
     html! { (table.finish()) p { (words) } }
 }
 
 fn footprints(pairs: &[BeforeAfter]) -> Markup {
     let mut table = Table::new(
-        "Footprints between the images, by tie points; positive along track; samples include relief parallax",
+        "Footprints between the images, from tie points; positive along track; samples include relief parallax",
         &[
             Column::Text("profile"),
             Column::Text("pair"),
@@ -269,7 +269,7 @@ fn footprints(pairs: &[BeforeAfter]) -> Markup {
         let spacing = pair.before.mola_spacing_m;
         let spacing = spacing.map(|metres| format!(" One shot spacing: {} m.", label(metres, 1)));
         notes.push(format!(
-            "{}: by a polynomial of order {} through {} tie points ({} rejected), σ {} lines and {} samples. {}{}",
+            "{}: polynomial of order {} through {} tie points ({} rejected), σ {} lines and {} samples. {}{}",
             pair.name(),
             found.order,
             found.ties,

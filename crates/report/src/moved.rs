@@ -108,7 +108,8 @@ fn footprints(before: &ImageProducts, after: &ImageProducts) -> Option<Plot> {
         each: shown,
     });
     let words = format!(
-        "Footprints near the middle, flight to the right. Median shift of all {} within its lines, seen or beside it: {} lines, {} samples.",
+        "Footprints near the middle, flight to the right. Median shift of all {} within the image's lines, inside or beside: \
+         {} lines, {} samples.",
         whole(all.len()),
         label(lines, 2),
         label(across, 2)

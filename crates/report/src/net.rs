@@ -57,7 +57,7 @@ fn lead(config: &NetConfig, net: &Triangulation) -> Markup {
     let [x, y] = totals.deviation_rms_m;
     let [east, north] = totals.control_rms_m;
     let mut words = format!(
-        "{} Images of the ties lie {x:.1} m (east) and {y:.1} m (north) from their means, root mean square; controls \
+        "{} Root mean square distances: images of ties {x:.1} m (east) and {y:.1} m (north) from their means; controls \
          {east:.1} m and {north:.1} m from their given positions.",
         way(config)
     );
@@ -79,7 +79,7 @@ fn way(config: &NetConfig) -> String {
     match way.method {
         Method::Scale => format!("BRICK, EXTEND, SCALE{local}: the figure keeps its shape."),
         Method::Mortar => format!(
-            "BRICK, EXTEND, MORTAR, SCALE{local}: bricks are adjusted to the controls by their weights."
+            "BRICK, EXTEND, MORTAR, SCALE{local}: bricks are adjusted to the controls according to their weights."
         ),
         Method::OneShot => "All pictures and controls at once, then SCALE.".to_owned(),
     }
@@ -146,7 +146,7 @@ fn deviations(net: &Triangulation) -> Result<Markup> {
         .map(|picture| km(picture.centre_m))
         .collect();
     let places: Vec<(f64, f64)> = net.points.iter().map(|point| km(point.place_m)).collect();
-    let caption = "Deviations of tie-point images from their mean within the brick, drawn at the map position of the \
+    let caption = "Deviations of the images of ties from their mean within the brick, drawn at the map position of the \
                    point. Thinned for display.";
     map(
         "Vectors of deviations",
@@ -244,9 +244,9 @@ fn bricks(net: &Triangulation) -> Markup {
         .min_by(|(_, a), (_, b)| a.factor.total_cmp(&b.factor));
     let words = strongest.map(|(what, ShrinkageResult { factor, law })| {
         paragraph(&format!(
-            "Two controls without redundancy shrink the figure between them, since residuals of ties shrink with it. \
-             The largest effect is at {what}: {:.1} parts in a million; the law L′/L = 1 / (1 + 2T / (w L²)) gives \
-             {:.1}. It is removed everywhere before SCALE.",
+            "Two controls without redundancy shrink the figure between them, because tie residuals shrink with it. \
+             The largest effect is at {what}: {:.1} parts per million; the law L′/L = 1 / (1 + 2T / (w L²)) gives \
+             {:.1}. The shrinkage is removed everywhere before SCALE.",
             1e6 * (1.0 - factor),
             1e6 * (1.0 - law)
         ))
@@ -268,7 +268,8 @@ fn blunders(net: &Triangulation) -> Markup {
             .then(length_m(b).total_cmp(&length_m(a)))
     });
     let mut table = Table::new(
-        "Rejected measurements, then the largest deviations, from the mean of the point over all pictures; full list in deviations.csv",
+        "Rejected measurements, then largest deviations from the mean of the point over all pictures; full list in \
+         deviations.csv",
         &[
             Column::Text("point"),
             Column::Text("picture"),
@@ -302,13 +303,13 @@ fn blunders(net: &Triangulation) -> Markup {
         of.removed && same.count() == 2
     };
     let both_go = if worst.iter().copied().any(|of| on_two(&of)) {
-        " For a point on two pictures, the erroneous measurement cannot be identified, and both are rejected."
+        " For a point on two pictures, the erroneous measurement cannot be identified; both measurements are rejected."
     } else {
         ""
     };
-    let words = "Flagged measurements are beyond 3.5 robust standard deviations (by the median) of their brick. One is \
-        rejected when its deviation in the adjustment of the whole net, divided by its own standard deviation, exceeds the \
-        largest expected by chance in one net of a hundred.";
+    let words = "Flagged measurements are beyond 3.5 robust standard deviations (from the median) of their brick. A \
+        measurement is rejected when its deviation in the adjustment of the whole net, divided by its standard deviation, \
+        exceeds the largest value expected by chance in one net of a hundred.";
     html! { (table.finish()) p { (words) (both_go) } }
 }
 
@@ -356,8 +357,8 @@ fn controls(net: &Triangulation) -> Result<Markup> {
         .collect();
     let figure = map(
         "Vectors of residuals at the controls",
-        "Given minus computed by SCALE of the free figure. Blunders are identified by least median of squares over the \
-         similarities through each pair of controls.",
+        "Given minus computed positions, from SCALE of the free figure. Blunders are identified by least median of squares \
+         over the similarities through each pair of controls.",
         vec![
             arrows("kept", 0, vectors(true)),
             arrows("rejected", 1, vectors(false)),
@@ -370,19 +371,19 @@ fn controls(net: &Triangulation) -> Result<Markup> {
 fn precision(config: &NetConfig, net: &Triangulation) -> Markup {
     let totals = &net.totals;
     let sigma = match totals.tie_sigma_m {
-        None => "The standard deviation of an image is not determined: there is no redundancy."
+        None => "The standard deviation of an image coordinate is not determined: there is no redundancy."
             .to_owned(),
         Some(sigma_m) => {
             let source = if totals.tie_sigma_given {
                 "as given"
             } else {
-                "by the bricks' deviations"
+                "from the deviations in bricks"
             };
             let largest = totals.largest_sigma_m.map_or_else(String::new, |of| {
-                format!(" The largest of a point is ±{of:.1} m.")
+                format!(" The largest standard deviation of a point is ±{of:.1} m.")
             });
             format!(
-                "A coordinate of an image has a standard deviation of {sigma_m:.2} m, {source}.{largest}"
+                "An image coordinate has a standard deviation of {sigma_m:.2} m, {source}.{largest}"
             )
         }
     };
@@ -394,7 +395,7 @@ fn precision(config: &NetConfig, net: &Triangulation) -> Markup {
         totals.tie_equations, totals.control_equations, totals.unknowns, totals.redundancy
     );
     let floor = format!(
-        "Pictures are treated as parts of a conformal map. An orthographic one departs from a similarity on this map \
+        "Pictures are treated as parts of a conformal map. An orthographic picture departs from a similarity on this map \
          by up to \
          {:.2} m here: a systematic lower limit of the deviations for any adjustment.",
         totals.projection_floor_m
@@ -402,7 +403,7 @@ fn precision(config: &NetConfig, net: &Triangulation) -> Markup {
     let sigmas = if config.triangulation.method == Method::OneShot {
         ""
     } else {
-        " Standard deviations of points come from the adjustment of all pictures and kept controls at once, by their weights."
+        " Standard deviations of points come from the simultaneous weighted adjustment of all pictures and kept controls."
     };
     html! { p { (sigma) (scale) (sigmas) } p { (redundancy) } p { (floor) } }
 }

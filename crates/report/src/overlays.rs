@@ -35,7 +35,7 @@ fn write(site: &SiteProducts) -> Result<Markup> {
         return Ok(Markup::default());
     };
     let words = format!(
-        "{} with footprints and tie points on their pixels, before and after the adjustment, and {} of the ground in pairs of \
+        "{} with footprints and tie points on the pixels, before and after the adjustment, and {} on the ground in pairs of \
          images: ",
         html::counted(overlays.images.len(), "image"),
         html::counted(overlays.places.len(), "place"),
@@ -83,7 +83,7 @@ pub fn overlays_page(site: &SiteProducts) -> Result<Option<String>> {
 fn lead(site: &SiteProducts) -> Markup {
     let mut keys = vec!["blue circle: the point computed with the orientation from the kernels"];
     if site.adjustment().is_some() {
-        keys.push("orange upright cross: the point from the adjusted orientation");
+        keys.push("orange upright cross: the point computed with the adjusted orientation");
         keys.push("yellow diagonal cross: a measured tie point");
     } else if site.geometric.is_some() {
         keys.push("yellow diagonal cross: a measured tie point");
@@ -93,7 +93,7 @@ fn lead(site: &SiteProducts) -> Markup {
         (list(&keys))
         p {
             "Numbers count the shots of a profile, from 1. The middle of each mark is open. Image patches show the \
-             same ground at the same place, north up; dark violet marks areas beyond the image or without data. In \
+             same ground at the same position, north up; dark violet marks areas beyond the image or without data. In \
              composites of two images the first is red and the second cyan, so that coincident ground is grey."
         }
     }
@@ -115,7 +115,7 @@ fn strip_figure(site: &SiteProducts, shown: &ShownImage, picture: &Picture) -> M
     let id = &image.times.id;
     let inside = image.registration.points.inside_count();
     let mut words = format!(
-        "{id}, {} lines of {} samples, {} × {} of them one pixel; line 0 is at the top. {} in it according to the \
+        "{id}, {} lines of {} samples, {} × {} of them per pixel; line 0 is at the top. {} inside according to the \
         kernels",
         whole(image.times.line_times.lines()),
         whole(image.times.samples),
@@ -205,7 +205,7 @@ fn caption(site: &SiteProducts, place: &Place) -> String {
     };
     let _infallible = write!(
         words,
-        "{} m a pixel, {} m from edge to edge.",
+        "{} m per pixel, {} m from edge to edge.",
         label(place.pixel_m, 1),
         label(edge_m, 0)
     );

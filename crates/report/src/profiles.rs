@@ -15,7 +15,7 @@ use areograph_stages::check_profiles::{ProfileCheck, WithheldStretch};
 const SHOWN: usize = 400;
 
 pub(super) const SECTION: Section = Section {
-    title: "The surface between shots, tested",
+    title: "Test of the surface between shots",
     anchor: "surface-tested",
     checks: &[CheckKind::WithheldStretches],
     appears: |site| {
@@ -30,7 +30,7 @@ fn write(site: &SiteProducts) -> Result<Markup> {
     Ok(html! {
         p {
             "Every stretch of a profile is withheld in turn and predicted from the other profiles, in the same way as the ground \
-             under tie points. The stretch takes no part in its prediction."
+             under tie points. The stretch is not used in its prediction."
         }
         @if let Some(score) = &check.score {
             (table(score))
@@ -104,9 +104,9 @@ fn plot(stretches: &[WithheldStretch]) -> Plot {
             high: farthest_km.max(0.1),
         },
         ..Plot::of(
-            "Withheld stretches against the surface".to_owned(),
-            "Mean of measured minus predicted heights of each stretch, in its stated σ, by the distance of the nearest shot of another \
-             profile. Lines: stated intervals of 95 and 99.7 %."
+            "Withheld stretches above the surface".to_owned(),
+            "Mean of measured minus predicted heights of each stretch, in stated σ, against the distance of the nearest shot of \
+             another profile. Lines: stated intervals of 95 and 99.7 %."
                 .to_owned(),
             "distance of the nearest shot, km",
             vec![panel],

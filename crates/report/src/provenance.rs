@@ -23,7 +23,7 @@ fn write(site: &SiteProducts) -> Markup {
     let config = site.config;
     let file_name = areograph_store::files::file_name(&config.file);
     let words = format!(
-        "Cite as: areograph {}, site {}, configuration {file_name} (BLAKE3 of its keys {}). Computed with {}.",
+        "Cite as: areograph {}, site {}, configuration {file_name} (BLAKE3 hash of its keys {}). Computed with {}.",
         env!("CARGO_PKG_VERSION"),
         config.site,
         config.blake3,
@@ -79,7 +79,7 @@ fn write(site: &SiteProducts) -> Markup {
         p { (words) }
         p {
             "Made by " code { "areograph run " (file_name) } "; " code { "areograph report " (config.site) }
-            " makes this page again."
+            " regenerates this page."
         }
         p {
             (link("../manifest.json", "manifest.json")) ": verdict, checks, figures and hashes for programs. "
@@ -144,7 +144,10 @@ fn settings(site: &SiteProducts) -> Markup {
         Column::Text("value"),
         Column::Text("default"),
     ];
-    let mut table = Table::new("Settings as written; all others are the defaults", columns);
+    let mut table = Table::new(
+        "Settings as written; all other settings have default values",
+        columns,
+    );
     let declared = config::keys();
     let hidden = hidden(site);
     let is_hidden = |key: &str| image_of(key).is_some_and(|image| hidden.contains(image));

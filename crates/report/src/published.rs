@@ -27,13 +27,14 @@ pub(super) const SECTION: Section = Section {
 fn departure(summary: &AdjustmentSummary) -> &'static str {
     match summary.model {
         AdjustmentModel::Published => {
-            "Across track this is not the published model: residuals refer to the line that sees the point, where the \
-             paper uses the measured line. The paper's means of MOLA across track, −2.711 to 3.286 px at Gusev and Isidis, \
-             are the skew of the flight in the measured line and vanish here; its σ0 of 1.01 to 1.06 is not comparable."
+            "Across the track, this is not the published model: residuals refer to the line that sees the point, whereas \
+             Yoon & Shan 2004 use the measured line. Their across-track means of MOLA, −2.711 to 3.286 px at Gusev and Isidis, \
+             result from the skew of the flight in the measured line and vanish here. Their σ0 of 1.01 to 1.06 is not \
+             comparable."
         }
         AdjustmentModel::MolaSurface => {
-            "In this model image coordinates of footprints are not observations; their rows are empty. The published model \
-             (adjustment.model) fills them."
+            "In this model, image coordinates of footprints are not observations; their rows are empty. The published model \
+             (adjustment.model) fills these rows."
         }
     }
 }
@@ -94,7 +95,7 @@ fn ground_corrections(summary: &AdjustmentSummary) -> Markup {
     html! {
         (table.finish())
         p {
-            "Adjusted minus initial, body-fixed axes. The paper's RMS is the standard deviation about the mean."
+            "Adjusted minus initial, body-fixed axes. The RMS of Yoon & Shan 2004 is the standard deviation about the mean."
         }
     }
 }
@@ -133,7 +134,7 @@ fn image_coordinates(site: &SiteProducts, summary: &AdjustmentSummary) -> Markup
 
 fn ground_sigmas(summary: &AdjustmentSummary) -> Markup {
     let mut table = Table::new(
-        "A posteriori standard deviations of ground points (Table 4 of Yoon & Shan 2004), metres, means",
+        "A posteriori standard deviations of ground points (Table 4 of Yoon & Shan 2004): means, metres",
         &[
             Column::Text("points"),
             Column::Number("σ X"),

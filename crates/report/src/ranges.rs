@@ -79,9 +79,9 @@ fn untested(site: &SiteProducts) -> Markup {
     );
     html! {
         p {
-            "The ranges are not tested: the tables contain no position of the spacecraft, and no kernels cover the shots. The \
-             spacecraft is placed on the radius through the footprint at the range (nadir by range); its distance from the \
-             footprint is the range."
+            "The ranges are not tested: the tables contain no spacecraft position, and no kernels cover the shots. The \
+             spacecraft is placed on the radius through the footprint (nadir by range): its distance from the footprint \
+             equals the range."
         }
         (table.finish())
     }
@@ -219,11 +219,11 @@ fn limits(site: &SiteProducts) -> Markup {
     let limits = &site.config.range_check;
     html! {
         p {
-            "Judged: profiles of at least " (traced(&limits.shots_min.to_string(), "ranges.json#/limits/shots_min"))
+            "Judged: profiles with at least " (traced(&limits.shots_min.to_string(), "ranges.json#/limits/shots_min"))
             " shots. Limits: at most "
             (traced(&number(100.0 * limits.outlier_share_max, 1), "ranges.json#/limits/outlier_share_max*100"))
             " % outliers (beyond " (traced(&limits.outlier_sigma.to_string(), "ranges.json#/limits/outlier_sigma"))
-            " robust σ of the median). Bars: share of a limit that is used."
+            " robust σ of the median). Bars: used share of a limit."
         }
     }
 }
@@ -339,7 +339,7 @@ fn three_ways(site: &SiteProducts) -> Markup {
             li {
                 "Shots − kernels: spacecraft positions, inertial axes; beyond "
                 (traced(&limits.orbit_max_m.to_string(), "ranges.json#/limits/orbit_max_m"))
-                " m orbit, clock or datum differ."
+                " m, orbit, clock or datum differ."
                 // A table's own spacecraft and the spacecraft of support data are not tabulated.
                 @if error_m > 0.0 {
                     " Trajectory tabulated to "

@@ -45,7 +45,7 @@ fn write(site: &SiteProducts) -> Result<Markup> {
     Ok(html! {
         (many::some_of_all(site))
         (profiles(site, &images))
-        (folded("Footprints over the lines, and the effect of other camera models", &evidence))
+        (folded("Footprints along the lines, and the effect of other camera models", &evidence))
     })
 }
 
@@ -184,7 +184,7 @@ fn plane(profiles: &[Profile], image: &ImageProducts) -> Plot {
         ..Panel::of("sample", series)
     };
     let words = format!(
-        "{} of {} footprints inside, of {}. Flight to the right; dashed: sides of the image, solid: its ends.",
+        "{} of {} footprints inside, of {}. Flight to the right; dashed: image sides; solid: image ends.",
         whole(points.inside_count()),
         whole(points.len()),
         counted(shown, "profile")
@@ -203,7 +203,7 @@ fn plane(profiles: &[Profile], image: &ImageProducts) -> Plot {
 /// Effect of the choice of the model.
 fn models(images: &[Indexed]) -> Markup {
     let mut table = Table::new(
-        "Other models compared with the one used, for footprints within the image's lines",
+        "Other models compared with the model used, for footprints within the image's lines",
         &[
             Column::Text("image"),
             Column::Text("used"),

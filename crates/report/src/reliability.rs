@@ -61,12 +61,12 @@ pub(super) fn absolute(
             };
             html! {
                 "heights follow " (altimeter) " to " (sigma(2, 1)) " m on average; position is known to " (sigma(0, 0))
-                " m east and " (sigma(1, 0)) " m north, by " (place_by(geometric, adjustment))
+                " m east and " (sigma(1, 0)) " m north, from " (place_by(geometric, adjustment))
             }
         }
         None if summary.model == AdjustmentModel::Published => html! {
-            "heights and position are not determined: image coordinates of footprints come from the orientation that is \
-             adjusted"
+            "heights and position are not determined: image coordinates of footprints are computed from the \
+             orientation to be adjusted"
         },
         None => html! { "heights and position are a priori, from " (known_beforehand(geometric)) },
     };
@@ -177,11 +177,11 @@ pub(super) fn redundancy(site: &SiteProducts, adjusted: &Adjusted) -> Markup {
         let consequence = if hidden {
             "such errors cannot be detected"
         } else {
-            "only large ones are detected"
+            "only large errors are detected"
         };
         if found.mean < SHOWN {
             sentences.push(format!(
-                "A gross error in a {} shows only {mean} in its residual: {consequence}.",
+                "Only {mean} of a gross error in a {} appears in the residual: {consequence}.",
                 of.name
             ));
         }
@@ -223,8 +223,8 @@ pub(super) fn correlations(summary: &AdjustmentSummary) -> Markup {
     };
     let sum = if *largest < 0.0 { "sum" } else { "difference" };
     let words = format!(
-        "{} correlate by more than 0.95, most of all {first} and {second} ({}): only their {sum}, each over its σ, is determined. \
-         Do not interpret the single values.",
+        "{} correlate by more than 0.95, most of all {first} and {second} ({}): only their {sum}, each divided by its σ, is \
+         determined. Do not interpret the individual values.",
         counted(all.len(), "pair") + " of unknowns",
         label(*largest, 4)
     );

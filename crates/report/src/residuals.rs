@@ -97,7 +97,7 @@ pub(super) fn distribution(adjusted: &Adjusted) -> Result<Markup> {
             .count()
     };
     let words = format!(
-        "Share of tie point residuals below each value, in their own σ. Beyond {}: {} of {} along track, {} of {} across.",
+        "Share of tie point residuals below each value, in units of σ. Beyond {}: {} of {} along track, {} of {} across.",
         label(BAARDA_LIMIT, 2),
         whole(beyond(&along)),
         whole(along.len()),

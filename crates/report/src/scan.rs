@@ -24,7 +24,8 @@ pub(super) const SECTION: Section = Section {
 
 fn write(site: &SiteProducts) -> Result<Markup> {
     let words = paragraph(
-        "The time-tag correction that minimises the spread of the residuals, with raw or crossover-corrected radii, whichever gives the smaller scatter. Nadir profiles constrain it poorly.",
+        "The best time-tag correction minimises the spread of the residuals, with the radii (raw or crossover-corrected) that \
+         give the smaller spread. Nadir profiles constrain the correction poorly.",
     );
     let plots = plotted(site).into_iter();
     let plots = plots.filter_map(|index| scan_plot(site, index));
@@ -108,7 +109,7 @@ fn scan_plot(site: &SiteProducts, index: usize) -> Option<Plot> {
         signed(configured_s, 3)
     );
     let title = format!("Clock bias scan of {}", ranges.profile);
-    let x = "assumed correction of the tags, s";
+    let x = "assumed time-tag correction, s";
     Some(Plot::of(title, caption, x, vec![panel]))
 }
 

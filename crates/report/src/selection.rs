@@ -57,7 +57,7 @@ fn write(site: &SiteProducts) -> Markup {
 
 fn filter(site: &SiteProducts) -> String {
     if !site.config.shots.is_empty() {
-        return "Shots of tables are kept if they lie in a window; duplicate rows are counted once.".to_owned();
+        return "Shots in tables are kept if they lie in a window; duplicate rows are counted once.".to_owned();
     }
     let filter = &site.config.pedr.filter;
     let join = |values: Vec<String>| values.join(", ");
@@ -130,7 +130,7 @@ fn outline(window: &WindowConfig) -> String {
         }
         WindowShape::Image { image, margin_m } => {
             format!(
-                "ground seen by image {image}, and {:.1} km beyond",
+                "ground shown by image {image}, with a margin of {:.1} km",
                 margin_m / METRES_PER_KM
             )
         }

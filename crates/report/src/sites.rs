@@ -94,8 +94,8 @@ pub fn sites_page(sites: &[SiteLine]) -> Result<String> {
     } else {
         Tone::Good
     };
-    let words = "Heights off: median height of the tie points above the laser surface. Images apart: along track, the worst pair. \
-         Range − distance: the largest mean of a profile.";
+    let words = "Heights off: median height of the tie points above the laser surface. Images apart: along-track disagreement \
+         of the worst pair. Range − distance: largest mean of a profile.";
     let budgets = sites.iter().filter_map(|site| site.products.as_ref());
     let budgets: Vec<UncertaintyBudget> = budgets.flat_map(|of| of.budgets.clone()).collect();
     let lead = html! {

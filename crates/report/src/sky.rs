@@ -99,7 +99,7 @@ fn azimuth_rad(ground_m: &Vector3<f64>, camera_m: &Vector3<f64>) -> f64 {
 fn words(site: &SiteProducts, unnamed: &[&str]) -> String {
     let images = site.images.iter().filter_map(middle).count();
     let mut words = format!(
-        "{} seen from the ground at their middle; zenith at the centre.",
+        "{}, as seen from the ground at the image middle; zenith at the centre.",
         counted(images, "image")
     );
     words += &many::drawn_in_words(site);

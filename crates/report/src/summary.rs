@@ -260,9 +260,9 @@ fn in_place(site: &SiteProducts) -> Option<KeyNumber> {
         ),
         note: html! {
             @if is_open(&geometric, &adjustment) {
-                "by " (by) "; see accuracy for open points"
+                "from " (by) "; see accuracy for open points"
             } @else {
-                "position by " (by) ", height by " (site.config.terms().altimeter)
+                "position from " (by) ", height from " (site.config.terms().altimeter)
             }
             (untested_attitude(site))
         },

@@ -33,8 +33,8 @@ fn write(site: &SiteProducts) -> Markup {
         _ => ids.join(", "),
     };
     let mut words = format!(
-        "Camera, line times and orientation of {} come from image support data (CSM, as ALE writes them). Nothing is applied \
-         to them: no pointing (CK) bias, clock correction or light time, no kernel. Their adjusted orientation is in \
+        "Camera, line times and orientation of {} come from image support data (CSM, as written by ALE). Nothing is applied \
+         to them: no pointing (CK) bias, clock correction, light time or kernel. The adjusted orientations are in \
          adjusted_isd.json, not in SPICE kernels.",
         named(&ids)
     );
@@ -43,7 +43,7 @@ fn write(site: &SiteProducts) -> Markup {
     if !apart.is_empty() {
         words += &format!(
             " Positions from ALE usually include light time and aberration, which amount to hundreds of metres: \
-             neither ranges nor the mounting of the laser are used with {}.",
+             neither ranges nor the laser mounting are used with {}.",
             named(&apart)
         );
     }
@@ -56,14 +56,14 @@ fn write(site: &SiteProducts) -> Markup {
             Column::Text("spacecraft"),
             Column::Number("focal length, mm"),
             Column::Number("pixel, µm"),
-            Column::Number("line off the boresight, px"),
+            Column::Number("offset of the line from the boresight, px"),
             Column::Text("distortion"),
             Column::Number("positions"),
             Column::Number("every, s"),
             Column::Number("attitudes"),
             Column::Number("every, s"),
-            Column::Number("s before the first line"),
-            Column::Number("s after the last"),
+            Column::Number("before the first line, s"),
+            Column::Number("after the last line, s"),
         ],
     );
     let shown = many::shown(site).into_iter();

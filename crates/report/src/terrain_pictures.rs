@@ -66,7 +66,7 @@ pub fn terrain_pictures(account: &SurfaceAccount, terms: &Terms<'_>) -> Result<M
     let shaded = frame.figure(
         "Terrain model, shaded",
         &format!(
-            "Heights above the sphere of {} m, lit from the north-west; slopes are drawn {} times as steep. {} % of the ground \
+            "Heights above the sphere of {} m, lit from the north-west; slopes are exaggerated {} times. {} % of the ground \
              that both images show has a height.",
             label(body.map().radius_m, 0),
             label(exaggeration, 0),
@@ -85,7 +85,7 @@ pub fn terrain_pictures(account: &SurfaceAccount, terms: &Terms<'_>) -> Result<M
     let of_sigmas = frame.figure(
         "Standard deviations of the terrain model",
         &format!(
-            "Cell by cell; {} m root mean square. They do not include errors that all heights share.",
+            "Standard deviation of each cell; root mean square {} m. Errors that all heights share are not included.",
             label(account.sigma_m, 2)
         ),
         &bar,

@@ -52,10 +52,10 @@ const COLUMNS: &[Column] = &[
     Column::Number("in height, m"),
     Column::Number("in height by eq. 7, m"),
 ];
-const WORDS: &str = "As the paper computes: D = √(M² + σ²) of the reprojection residuals; across track it averages where its eq. 7 \
-                     adds squares, so both are given. Known flaw: eq. 7 adds the means of both images in quadrature, although \
-                     means of opposite sign add up by eq. 5, and eq. 6 assigns the remainder to the footprints. \
-                     Error-free shots leave such a remainder as well; it is not the accuracy of the altimeter.";
+const WORDS: &str = "As in Shan et al. 2005: D = √(M² + σ²) of the reprojection residuals. Across the track, the paper averages \
+                     where its eq. 7 adds squares; both results are stated. Known flaw: eq. 7 adds the means of both images \
+                     in quadrature, although means of opposite sign add up in eq. 5; eq. 6 assigns the remainder to the \
+                     footprints. Error-free shots also leave a remainder; it is not the accuracy of the altimeter.";
 
 /// Title of the budget by eq. 5.
 const SIGNED_TITLE: &str = "The same with Δ = Δ1 − Δ2 of every tie point (eq. 5)";
@@ -69,8 +69,8 @@ const SIGNED_COLUMNS: &[Column] = &[
     Column::Number("in height, m"),
 ];
 const SIGNED_WORDS: &str = "Means keep their signs. Not by orientation: mean misregistration of the footprints that the mean of the \
-                            tie points does not explain; of several pairs the root mean square. An error of a footprint in plan \
-                            moves both of its projections alike and does not show here. Agreement of two images, not accuracy.";
+                            tie points does not explain; for several pairs, the root mean square. A planimetric footprint error \
+                            moves both projections alike and is not visible here. Agreement of two images, not accuracy.";
 
 /// A row for each state of each of these pairs with a budget, and one of the budgets of all pairs before the adjustment.
 fn rows<const N: usize>(

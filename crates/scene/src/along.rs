@@ -113,7 +113,7 @@ pub fn write_scene_along(
         .map_or_else(|| "along".to_owned(), |image| image.id.to_lowercase());
     let site = SiteFile {
         id: &id,
-        description: "Given kernels over invented terrain, synthetic PEDR".to_owned(),
+        description: "Flight along given kernels over invented terrain, synthetic PEDR".to_owned(),
         kernels: SiteKernels::Metakernel(metakernel.display().to_string()),
         pedr: vec![format!("../pedr/{PEDR_NAME}")],
         ties: None,
@@ -196,7 +196,7 @@ impl TabulatedFlight {
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "negative and non-finite numbers become 0, whose instant is not the requested one"
+        reason = "negative and non-finite numbers become 0, which is not the requested instant"
     )]
     fn beam(&self, et: Et) -> Option<Beam> {
         let steps = et.since(self.first) / BEAM_STEP_S;

@@ -181,16 +181,18 @@ fn write_truth(
 ) -> Result<()> {
     let truth = ArchiveTruth {
         made_by: concat!("areograph scene ", env!("CARGO_PKG_VERSION")),
-        synthetic: "all of this is invented",
+        synthetic: "all values are invented",
         seed: options.seed,
         mola_clock_bias_s: usual_altimeter().clock_bias_s,
-        mola_clock_rule: "true time = tag - mola_clock_bias_s, in all files; coordinates hold at the true time",
+        mola_clock_rule: "true time = tag - mola_clock_bias_s, in all files; coordinates are valid at the true time",
         range_noise_m: RANGE_NOISE_M,
         range_step_m: RANGE_STEP_M,
         crossover_amplitude_m: CROSSOVER_AMPLITUDE_M,
         crossover_period_s: CROSSOVER_PERIOD_S,
-        crossover_rule: "ground and spacecraft of the files are too high by the residual, amplitude sin(2 pi et / period) at the frame's mid-point; radii are those before its subtraction",
-        bad_rule: "range_m: ranges of the revolution are too long; time_s: its tags are late by this much in addition to the clock bias; orbit_m: its ground and its spacecraft are too high",
+        crossover_rule: "in the files, ground and spacecraft are too high by the residual, amplitude sin(2 pi et / \
+                             period) at the mid-point of the frame; radii are the values before its subtraction",
+        bad_rule: "errors of a whole revolution: range_m, excess of the ranges; time_s, delay of the time tags in \
+                       addition to the clock bias; orbit_m, excess height of ground and spacecraft",
         bad_profiles: files.iter().filter_map(|file| file.bad.clone()).collect(),
         files,
     };
@@ -337,7 +339,7 @@ fn bad_revolution(bits: u64) -> u32 {
 
 /// Contents of the archive, for `README.txt`.
 const README: &str = "\
-pedr/*.b        PEDR files of 12 revolutions each, about a day
-kernels/        archive.tm and what it loads: leap seconds, clock, Mars, orbit
+pedr/*.b        PEDR files of 12 revolutions each (about a day)
+kernels/        archive.tm and the kernels that it loads: leap seconds, clock, Mars, orbit
 truth.json      injected errors: clock bias, noise, bad revolutions, gaps
 ";

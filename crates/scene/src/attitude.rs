@@ -80,7 +80,7 @@ impl Attitude {
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "a span has some ten thousand samples"
+        reason = "a span has about ten thousand samples"
     )]
     pub(super) fn new(orbit: &Orbit, hold: Option<&Hold>, span: Interval) -> Self {
         let count = (span.duration_s() / CK_STEP_S).ceil() as usize + 1;

@@ -14,9 +14,9 @@ use super::{
 use areograph_base::error::{Locate as _, Result};
 use areograph_geom::{calibration::Offset, ellipsoid::local_axes};
 
-const README: &str = "Two stereo lines of a camera in two orbits: support data, tie points, laser control, a calibration file.\n\
-    The lines are mounted askew and the orbits are wrong by hundreds of metres; truth.json gives both, and all\n\
-    true positions.\n\
+const README: &str = "Two stereo lines of a camera in two orbits: support data, tie points, laser control and a calibration\n\
+    file. The lines are mounted askew, and the orbits are wrong by hundreds of metres; truth.json states these errors and\n\
+    all true positions.\n\
     Next: areograph calibrate calibration.toml\n";
 
 /// Noise: tie points and control in images, pixels; control on the ground, metres.

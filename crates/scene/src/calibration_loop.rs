@@ -20,8 +20,8 @@ use areograph_base::{
 };
 
 const README: &str = "Three lines of a camera in one orbit: support data (isd/), pixels (images/), PEDR files of laser passes in two\n\
-    directions over their ground (pedr/), a calibration file. The lines are mounted askew and the orbit is wrong by hundreds of\n\
-    metres; truth.json gives both, and the true image coordinates of ground points.\n\
+    directions over the same ground (pedr/) and a calibration file. The lines are mounted askew, and the orbit is wrong by\n\
+    hundreds of metres; truth.json states these errors and the true image coordinates of ground points.\n\
     Next: areograph calibrate calibration.toml\n";
 
 /// Middle of the ground.
@@ -211,7 +211,7 @@ pub fn write_line_scene(directory: &Path, scene: &LineScene) -> Result<String> {
     }
     draft.finish()?;
     Ok(format!(
-        "{}: three lines with their pixels, {} laser passes over their ground; next: areograph calibrate {}",
+        "{}: three lines with pixels, {} laser passes over the same ground; next: areograph calibrate {}",
         directory.display(),
         passes.count(),
         directory.join("calibration.toml").display()

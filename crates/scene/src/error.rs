@@ -15,14 +15,14 @@ pub enum SceneError {
         list: &'static str,
     },
     /// The folder holds files outside an older scene.
-    #[error("the folder holds {entry}, which `areograph scene` did not write")]
+    #[error("the folder contains {entry}, which `areograph scene` did not write")]
     #[cause(Configuration: "a new scene would remove it: move it elsewhere, or choose another folder")]
     Foreign {
         /// Path below the folder.
         entry: String,
     },
     /// A file of the older scene has been changed.
-    #[error("{file} was changed since `areograph scene` wrote it")]
+    #[error("{file} has been changed since `areograph scene` wrote it")]
     #[cause(like = Foreign)]
     Changed {
         /// Path below the folder.
@@ -42,7 +42,7 @@ pub enum SceneError {
         iterations: u32,
     },
     /// The true orientation of an image is invalid.
-    #[error("image {image}: no camera sees its tie points: {error}")]
+    #[error("the true orientation of image {image} does not show its tie points: {error}")]
     #[cause(like = NoOrbit)]
     NoCamera {
         /// Image id.
@@ -61,7 +61,7 @@ pub enum SceneError {
     },
     /// The beam misses Mars.
     #[error("the laser beam misses Mars at ET {et_s:.3}")]
-    #[cause(Input: "the attitude kernels do not point +Z at Mars there; leave them out")]
+    #[cause(Input: "the attitude kernels do not point +Z at Mars at this time; omit them")]
     BeamMisses {
         /// True time of the shot.
         et_s: f64,
@@ -89,7 +89,7 @@ pub enum SceneError {
     },
     /// The kernels do not cover a single stretch of 20 s.
     #[error("the kernels have no interval of {least_s} s or more with both orbit and attitude")]
-    #[cause(Coverage: "check that the metakernel loads SPK for -94 and 499 and CK for -94000 of the same time")]
+    #[cause(Coverage: "check that the metakernel loads SPK for -94 and 499 and CK for -94000 for the same time")]
     NothingToFly {
         /// Shortest stretch of flight, seconds.
         least_s: f64,

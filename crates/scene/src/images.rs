@@ -102,7 +102,7 @@ fn encoded(flown: &Flown, pixels: &[u8], stop: &str, coder: Coder) -> Result<Vec
     let image = NewImage {
         product_id: &planned.id.replace('-', "/"),
         instrument: [&usual_instrument().label.instrument, ""],
-        clock: clock.ok_or_else(|| failed("its clock string has no seconds and ticks"))?,
+        clock: clock.ok_or_else(|| failed("the clock string contains no seconds and ticks"))?,
         utc: [planned.utc_start, stop],
         exposure_s: planned.exposure_ms * SECONDS_PER_MS,
         summing: u8::try_from(planned.summing).unwrap_or(u8::MAX),

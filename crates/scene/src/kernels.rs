@@ -122,7 +122,7 @@ fn metakernel(family: &str, names: &[String]) -> String {
     let list: Vec<String> = names.iter().map(|name| format!("'{name}'")).collect();
     format!(
         "KPL/MK\n\nKernels of a synthetic mission with the orbit of family {family}; written by\n\
-         `areograph scene`. Paths count from the folder of this file.\n\n\\begindata\n\n\
+         `areograph scene`. Paths are relative to the folder of this file.\n\n\\begindata\n\n\
          KERNELS_TO_LOAD = ( {} )\n\n\\begintext\n",
         list.join("\n                    ")
     )
@@ -194,7 +194,7 @@ pub(super) fn write_attitude(folder: &Path, session: &Session, arcs: &[Arc]) -> 
         })
         .collect();
     let comment = format!(
-        "{SYNTHETIC}\nTime tags carry the error of the mission's kernels: the attitude of time t \
+        "{SYNTHETIC}\nTime tags contain the error of the mission's kernels: the attitude of time t \
          is stored at t - 1.15 s."
     );
     write_ck(&folder.join(CK_NAME), session, &segments, &comment)
@@ -228,7 +228,7 @@ pub(super) fn write_orbits(folder: &Path, arcs: &[Arc], seed: u64) -> Result<()>
             })
             .collect();
         let comment =
-            format!("{SYNTHETIC}\nOrbit of family {family}; the truth is that of family gsfc.");
+            format!("{SYNTHETIC}\nOrbit of family {family}; family gsfc is the true orbit.");
         write_spk(&folder.join(spk_name(family)), &segments, &comment)?;
     }
     match (arcs.first(), arcs.last()) {
@@ -349,7 +349,7 @@ fn kernel_state(state: &super::orbit::OrbitState) -> State {
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
-    reason = "a day has some thousand states"
+    reason = "a day has 1,440 states"
 )]
 fn epochs(span: Interval, step_s: f64) -> Vec<Et> {
     let count = (span.duration_s() / step_s).ceil() as usize + 1;

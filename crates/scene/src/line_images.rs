@@ -151,7 +151,7 @@ impl LineImages<'_> {
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "clamped to a byte just before; 0 means no pixel"
+        reason = "clamped to the range of a byte before; 0 means no pixel"
     )]
     fn read_out(&self, line: &StereoLine, dn: f64, at_line: u32, sample: u32) -> u8 {
         let key = line

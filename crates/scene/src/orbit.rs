@@ -75,7 +75,7 @@ impl Orbit {
     /// Revolutions completed at `et`, counted at the southernmost point.
     #[allow(
         clippy::cast_possible_truncation,
-        reason = "an arc has a few revolutions"
+        reason = "an arc contains a few revolutions"
     )]
     pub(super) fn revolution(&self, et: Et) -> i32 {
         (self.mean_anomaly(et) / std::f64::consts::TAU).floor() as i32

@@ -12,8 +12,8 @@ use super::{
 use areograph_base::error::{Locate, Result};
 use areograph_geom::plane::Place;
 
-const README: &str = "A net of 25 rectified pictures for plane triangulation: measurements, controls, a net file.\n\
-    Some measurements and two controls are wrong on purpose; truth.json lists them, with all true positions.\n\
+const README: &str = "A net of 25 rectified pictures for plane triangulation: measurements, controls and a net file.\n\
+    Some measurements and two controls are intentionally wrong; truth.json lists them and all true positions.\n\
     Next: areograph triangulate net.toml\n";
 
 /// The tertiary net of the paper with more points and controls, and noise.

@@ -222,7 +222,7 @@ impl Octave {
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "a patch has some ten thousand nodes across; signs wrap into other hashes"
+        reason = "a patch is about ten thousand nodes wide; negative indices wrap into other hashes"
     )]
     fn node(&self, x: f64, y: f64) -> f64 {
         let place = u64::from(x as i32 as u32) << 32 | u64::from(y as i32 as u32);
@@ -281,7 +281,7 @@ fn craters(random: &mut Random) -> Vec<Crater> {
 
 #[allow(
     clippy::cast_possible_truncation,
-    reason = "a patch is some hundred cells across"
+    reason = "a patch is about a hundred cells wide"
 )]
 fn cell(plan_m: &Vector2<f64>) -> [i32; 2] {
     [plan_m.x, plan_m.y].map(|component_m| (component_m / CELL_M).floor() as i32)

@@ -18,7 +18,8 @@ use areograph_spice::Session;
 const INJECTED: &str = "injected by areograph scene";
 
 /// Option for matching tie points in pixels, as a comment.
-const MATCH: &str = "# match = true  # also measures tie points in the pixels of the images, with or without files\n";
+const MATCH: &str =
+    "# match = true  # also measures tie points in the image pixels, with or without files\n";
 
 /// A window of a site file, degrees.
 pub(super) struct Window {
@@ -107,7 +108,7 @@ impl SiteFile<'_> {
     pub(super) fn to_toml(&self) -> String {
         let files: Vec<String> = self.pedr.iter().map(|file| quoted(file)).collect();
         let mut text = format!(
-            "# Written by `areograph scene`; paths count from the folder of this file.\n\
+            "# Written by `areograph scene`; paths are relative to the folder of this file.\n\
              site = {}\ndescription = {}\n\n{}\n\
              [pointing]\nck_bias_s = {}\nsource = {}\n\n\
              [altimeter_clock]\nbias_s = {}\nsign = \"late\"\nscope = \"spk_lookup\"\nsource = {}\n\n\
@@ -134,7 +135,7 @@ impl SiteFile<'_> {
         }
         let _infallible = write!(
             text,
-            "\n# All formats of footprints; without this table a run writes footprints.parquet only.\n\
+            "\n# All footprint formats; without this table, a run writes only footprints.parquet.\n\
              [products]\nformats = [{}]\n",
             ShotFormat::WORDS.map(|(word, _)| quoted(word)).join(", "),
         );
@@ -198,7 +199,8 @@ pub(super) fn planned_site<'a>(
             .each_ref()
             .map(|camera| camera.focal_px_per_line);
         let note = format!(
-            "The noise of these tie points is {noise_px} lines and samples; a line is {first:.2} and {second:.2} focal-plane pixels."
+            "The noise of these tie points is {noise_px} lines and samples; their lines are {first:.2} and {second:.2} \
+             focal-plane pixels."
         );
         let along_px = 0.5 * (first + second) * noise_px;
         (note, [(1_000.0 * along_px).round() / 1_000.0, noise_px])
@@ -302,7 +304,7 @@ pub(super) fn planned_label(arc: &Arc, session: &Session) -> Result<String> {
 pub(super) fn image_label(label: &Label<'_>) -> String {
     let mut lines = vec![
         "PDS_VERSION_ID = PDS3".to_owned(),
-        "NOTE = \"SYNTHETIC: written by areograph scene, no such image file exists\"".to_owned(),
+        "NOTE = \"SYNTHETIC: written by areograph scene; no image file exists\"".to_owned(),
         format!("FILE_NAME = \"{}.IMQ\"", label.id.replace('-', "")),
         "RECORD_TYPE = UNDEFINED".to_owned(),
         "SPACECRAFT_NAME = MARS_GLOBAL_SURVEYOR".to_owned(),
@@ -346,22 +348,22 @@ pub(super) fn image_label(label: &Label<'_>) -> String {
 /// Text of `README.txt` below its first line.
 pub(super) const README: &str = "\
 kernels/     text kernels; orbit (three rival versions), attitude, Mars and Sun as binary kernels;
-             nav.tm, gsfc.tm, ipng.tm load them with one version of the orbit each, and nav_wa.tm, gsfc_wa.tm
-             and ipng_wa.tm with the frames of the wide-angle cameras as well
-pedr/        MOLA PEDR files: two whole days, five single revolutions; version K is in IAU 1991, L in IAU 2000
+             nav.tm, gsfc.tm and ipng.tm load one version of the orbit each with all other kernels; nav_wa.tm,
+             gsfc_wa.tm and ipng_wa.tm also load the frames of the wide-angle cameras
+pedr/        MOLA PEDR files: two whole days, five single revolutions; version K refers to IAU 1991, L to IAU 2000
 images/      with --images only: the six narrow-angle images, as in the archive
-labels/      labels of six narrow-angle images and three wide-angle ones
+labels/      labels of six narrow-angle and three wide-angle images
 ties/        tie points measured in both images of a site; some are blunders
 sites/       configurations for `areograph run`; gusev_context chooses among the three orbits, and has a profile
-             that is simultaneous with no image
-truth.json   true values: biases, orientation of the images, footprints in the sites' windows, errors of the rival
-             orbits (the orbit `gsfc` is the true one), and for the tie points the true time and position of each
-             exposure; drawn errors and the sizes from which they were drawn
+             that is not simultaneous with any image
+truth.json   true values: biases, image orientations, footprints in the windows of the sites, errors of the rival
+             orbits (the orbit `gsfc` is true), and the true time and position of each exposure of the tie points;
+             drawn errors and the distributions from which they were drawn
 
-Image ids, times, summing, line counts, line periods and emission angles are those of Shan et al. 2005, Table 2; of
-E04-01275, for which it prints 7424 lines, 8064 are exposed, as their Table 4 demands. Terrain, orbits and
+Image ids, times, summing, line counts, line periods and emission angles are from Shan et al. 2005, Table 2. The
+table reports 7424 lines for E04-01275; here 8064 are exposed, as Table 4 requires. Terrain, orbits and
 attitudes are invented.
-The wide-angle images of gusev_context are invented, and so is its profile of 2001-03-12 (ap18983l.b).
+The wide-angle images of gusev_context and its profile of 2001-03-12 (ap18983l.b) are also invented.
 ";
 
 /// Text of `README.txt` for a flight along given kernels.

@@ -244,7 +244,7 @@ fn ellipsoid_radius_m(direction: &Vector3<f64>) -> f64 {
 
 #[allow(
     clippy::cast_possible_truncation,
-    reason = "Mars is some fifty cells across"
+    reason = "Mars is about fifty cells wide"
 )]
 fn cell(place_m: &Vector3<f64>) -> [i32; 3] {
     [place_m.x, place_m.y, place_m.z].map(|component| (component / CELL_M).floor() as i32)

@@ -24,8 +24,8 @@ use areograph_base::{
 };
 use areograph_geom::{calibration::Offset, ellipsoid::spherical_to_xyz_m, height_grid::HeightGrid};
 
-const README: &str = "A stereo terrain model (model.tif) shifted from the ground, PEDR files of passes over it (pedr/) and support\n\
-    data of two images that show it (isd/); truth.json gives the shift.\n\
+const README: &str = "A stereo terrain model (model.tif) that is shifted from the ground, PEDR files of passes over this ground\n\
+    (pedr/), and support data of two images that show this ground (isd/); truth.json states the shift.\n\
     Next: areograph pedr match model.tif pedr --isd s1=isd/s1.json --isd s2=isd/s2.json\n";
 
 /// Middle of the model.

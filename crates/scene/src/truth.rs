@@ -279,32 +279,55 @@ impl Truth {
     pub(super) fn new(seed: u64, errors: &SceneErrors) -> Self {
         Self {
             made_by: "areograph scene",
-            synthetic: "all of this is invented; only ids, times, summing, lines, line periods and emission angles of the narrow-angle images follow Shan et al. 2005",
-            table_2: "emission angles are those of Shan et al. 2005, Table 2, taken at the ground; of E04-01275 the table prints 7424 header lines, for which the first-order RMSE in their Table 4 would be 9.7 m instead of the 11.45 m printed; here it has 8064 lines, of which 7424 are delivered",
-            orbit: "positions of images belong to the orbit gsfc (kernels/gsfc.tm), which is true except for errors_drawn; nav (used by the site files) and ipng differ from it by orbit_differences",
+            synthetic: "all values are invented, except that ids, times, summing, lines, line periods and emission angles of \
+                the narrow-angle images follow Shan et al. 2005",
+            table_2: "Emission angles are from Shan et al. 2005, Table 2, measured at the ground. For E04-01275, the table \
+                reports 7424 header lines, for which the first-order RMSE in their Table 4 would be 9.7 m instead of the \
+                published 11.45 m. Here the image has 8064 lines, of which 7424 are delivered.",
+            orbit: "image positions belong to the orbit gsfc (kernels/gsfc.tm), which is true except for errors_drawn; nav \
+                (used by the site files) and ipng differ from gsfc by orbit_differences",
             seed,
             errors: *errors,
-            errors_rule: "errors are standard deviations and ranges, errors_drawn the values drawn from them for the day of each image; lines were exposed time_bias_lines later than the label states; the true attitude of the bus is that of the C-kernel, its bias removed, attitude_clock_s later, turned by attitude: matrix from J2000 to the bus = exp([e]x) times that of the kernel, e = constant + linear x + quadratic x^2 (x = (et - middle) / half_image, held beyond -4 and 4) + jitter; bus_position_m (camera and laser) and camera_position_m (camera only) are added to the orbit gsfc, IAU 2000; the laser points boresight_rad from +Z of the bus towards its X and Y, the same in the whole mission; east_north_radial_m is the position of the shots in the PEDR file minus their true position; the spacecraft of the file is that of gsfc, moved along the beam until ranges agree with the ground of the file",
+            errors_rule: "Members of errors are standard deviations and ranges; members of errors_drawn are values drawn from \
+                them for the day of each image. Lines were exposed time_bias_lines later than the label states. The true \
+                attitude of the bus is the C-kernel attitude without its bias, attitude_clock_s later, turned by attitude: the \
+                matrix from J2000 to the bus is exp([e]x) times the C-kernel matrix, with e = constant + linear x + quadratic \
+                x^2 + jitter and x = (et - middle) / half_image, held beyond -4 and 4. bus_position_m (camera and laser) and \
+                camera_position_m (camera only) are added to the orbit gsfc, IAU 2000. The laser points boresight_rad from +Z \
+                of the bus towards its X and Y throughout the mission. east_north_radial_m is the position of the shots in the \
+                PEDR file minus their true position. The spacecraft position in the file is the position in gsfc, moved along \
+                the beam until ranges agree with the ground in the file.",
             errors_drawn: Vec::new(),
             biases: Biases {
                 ck_bias_s: usual_instrument().pointing.ck_bias_s,
                 ck_rule: "the attitude of true time t is stored in the C-kernel at t + ck_bias_s",
                 mola_clock_bias_s: usual_altimeter().clock_bias_s,
                 mola_clock_sign: "late",
-                mola_clock_rule: "true time = tag - mola_clock_bias_s, in all files; coordinates hold at the true time",
+                mola_clock_rule: "true time = tag - mola_clock_bias_s, in all files; coordinates are valid at the true time",
             },
             crossover: Crossover {
                 amplitude_m: CROSSOVER_AMPLITUDE_M,
                 period_s: CROSSOVER_PERIOD_S,
-                rule: "ground and spacecraft of the files are too high by the residual, amplitude_m sin(2 pi et / period_s) at the frame's mid-point; radii are those before its subtraction",
+                rule: "in the files, ground and spacecraft are too high by the residual, amplitude_m sin(2 pi et / period_s) at \
+                the mid-point of the frame; radii are the values before its subtraction",
             },
-            frame_model: "a PEDR frame is linear in latitude and longitude: near the poles, in slews and on steep ground seen off nadir it cannot represent 20 true footprints to 0.2 m, and it does not include jitter; the counts are under files and profiles",
+            frame_model: "A PEDR frame is linear in latitude and longitude. Near the poles, during slews and on steep ground \
+                off nadir, it cannot represent 20 true footprints to 0.2 m; it does not include jitter. The numbers of \
+                affected shots are under files, the largest errors under profiles.",
             images: Vec::new(),
             files: Vec::new(),
             profiles: Vec::new(),
-            tie_rule: "line n of an image was truly exposed when its label has line n + time_bias_lines, from the position of the orbit gsfc at that time plus position_bias_m (IAU 2000), with the true attitude of that time (errors_rule); line, position and quaternion of a camera are its true poses; it images ground by light that left it light_time_s before the exposure, with the positions of camera and Mars at that instant and the attitude of the exposure (light time and aberration); tie points are measured in such images, at ground_iau2000_m; the position bias against nav is position_bias_m less the orbit difference of nav; measurements have the noise tie_noise_px of errors in lines and samples, plus blunders",
+            tie_rule: "Line n of an image was exposed at the time that its label gives for line n + time_bias_lines, from the \
+                position of the orbit gsfc at that time plus position_bias_m (IAU 2000), with the true attitude of that time \
+                (errors_rule). Line, position and quaternion of a camera describe its true poses. The camera records light \
+                that left the ground light_time_s before the exposure, with the positions of camera and Mars at that instant \
+                and the attitude of the exposure (light time and aberration). Tie points are measured in such images, at \
+                ground_iau2000_m. The position bias relative to nav is position_bias_m minus the orbit difference of nav. \
+                Lines and samples of measurements have noise (tie_noise_px under errors), plus blunders.",
             ties: Vec::new(),
-            wide_angle_rule: "wide-angle images are exposed at the times of their labels, from the true position of the bus with its true attitude; the light time of each point is applied; lines and samples of shots follow the formula of the instrument kernel moc20.ti",
+            wide_angle_rule: "Wide-angle images are exposed at the times of their labels, from the true position of the bus \
+                 with its true attitude. The light time of each point is applied. Lines and samples of shots follow the \
+                 formula of the instrument kernel moc20.ti.",
             wide_angle: Vec::new(),
             rendered: Vec::new(),
         }

@@ -51,7 +51,7 @@ impl Content {
 
 /// The file changed repeatedly while it was being read.
 #[derive(Debug, thiserror::Error)]
-#[error("the file changes while it is read")]
+#[error("the file changed while it was being read")]
 struct Changes;
 
 impl Contents {

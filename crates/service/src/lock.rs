@@ -51,7 +51,7 @@ enum LockError {
     #[cause(Io: "stop that process first")]
     TakenByUnknown,
     #[error("the folder is on a network file system ({0}), where the database is not safe")]
-    #[cause(Configuration: "give outputs.state a folder on a local disk")]
+    #[cause(Configuration: "set outputs.state to a folder on a local disk")]
     Network(&'static str),
 }
 

@@ -133,7 +133,7 @@ pub fn recover(shared: &Shared) -> Result<()> {
         return Ok(());
     }
     shared.set_recovering(true);
-    tracing::warn!("the database was lost: the service rebuilds it from the products");
+    tracing::warn!("the database was lost: the service is rebuilding it from the products");
     let stops = || {
         shared.note_progress();
         shared.ending.is_cancelled()

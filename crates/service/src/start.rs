@@ -40,9 +40,9 @@ enum Refused {
     #[error("{0} changed")]
     #[cause("restart the service, or restore the former value")]
     NeedsRestart(&'static str),
-    #[error("inputs.{0}: {1} is not an existing folder, and this service has never seen it")]
+    #[error("inputs.{0}: the folder {1} does not exist and was never available to this service")]
     #[cause(
-        "correct the path, or mount the folder; a folder that was seen once may be unavailable later"
+        "correct the path, or mount the folder; only a folder that was available before may be missing"
     )]
     NeverSeen(&'static str, String),
 }
@@ -181,7 +181,7 @@ pub fn reload(shared: &Shared, listen: Option<SocketAddr>) -> Stored<()> {
     match &text {
         None => tracing::info!("the configuration {} is in force", before.file.display()),
         Some(text) => tracing::error!(
-            "the new configuration is invalid, and the former one stays in force: {text}"
+            "the new configuration is invalid, and the former configuration remains in force: {text}"
         ),
     }
     shared.write(|transaction: &Transaction<'_>| {

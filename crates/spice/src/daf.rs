@@ -139,7 +139,7 @@ impl Reader {
         let offset = (number - 1).saturating_mul(RECORD_SIZE as u64);
         if offset.saturating_add(RECORD_SIZE as u64) > self.size {
             return Err(damaged(format!(
-                "record {number} lies beyond the end of its {} bytes",
+                "record {number} lies beyond the end of the file ({} bytes)",
                 self.size
             )));
         }
@@ -205,14 +205,14 @@ impl Reader {
         let integers = usize::try_from(self.integer(&header, 12)).unwrap_or(0);
         if doubles != 2 || !(5..=SUMMARY_INTEGERS_MAX).contains(&integers) {
             return Err(damaged(format!(
-                "segment summaries of {doubles} doubles and {integers} integers; expected 2 and 5 or 6"
+                "segment summaries of {doubles} doubles and {integers} integers; expected 2 doubles and 5 or 6 integers"
             )));
         }
         let first_free_word = i64::from(self.integer(&header, 84));
         let bytes_needed = (first_free_word - 1) * 8;
         if !u64::try_from(bytes_needed).is_ok_and(|needed| needed <= self.size) {
             return Err(damaged(format!(
-                "{} bytes long; its file record states {bytes_needed}",
+                "the file has {} bytes; its file record states {bytes_needed} bytes",
                 self.size
             )));
         }
@@ -231,11 +231,11 @@ impl Reader {
         while next.abs() > 0.0 || next.is_nan() {
             if !(next >= 1.0 && next.fract().abs() < f64::EPSILON) {
                 return Err(damaged(format!(
-                    "its summary records continue at record {next}; expected a whole number"
+                    "the summary records continue at record {next}; expected a whole number"
                 )));
             }
             if records_left == 0 {
-                return Err(damaged("its summary records form a cycle".to_owned()));
+                return Err(damaged("the summary records form a cycle".to_owned()));
             }
             records_left -= 1;
             #[allow(
@@ -247,7 +247,7 @@ impl Reader {
             let count = self.double(&record, 2);
             if !(0.0..=summaries_max as f64).contains(&count) {
                 return Err(damaged(format!(
-                    "a summary record of {count} segments; at most {summaries_max} fit"
+                    "a summary record states {count} segments; expected at most {summaries_max}"
                 )));
             }
             let summaries = (0..summaries_max).take_while(|index| (*index as f64) < count);
@@ -285,7 +285,7 @@ impl Reader {
         let finite = segment.start.is_finite() && segment.stop.is_finite();
         if !(addresses_fit && ordered && finite) {
             return Err(damaged(format!(
-                "a segment from {} to {} at words {begin} to {end} of {first_free_word}",
+                "a segment from {} to {} at words {begin} to {end}; the first free word is {first_free_word}",
                 segment.start, segment.stop
             )));
         }

@@ -42,7 +42,7 @@ pub enum SpiceError {
     },
     /// A binary kernel is shorter than its own file record states, or its segment list is broken.
     #[error("damaged binary kernel: {problem}")]
-    #[cause("fetch the kernel again: the copy is incomplete or broken")]
+    #[cause("fetch the kernel again: the copy is incomplete or damaged")]
     DamagedKernel {
         /// The problem, with numbers.
         problem: String,
@@ -59,7 +59,7 @@ pub enum SpiceError {
     /// A metakernel names a file that does not exist.
     #[error("names {name}, which does not exist{candidates}")]
     #[cause(
-        "correct KERNELS_TO_LOAD or PATH_VALUES; relative paths count from the metakernel's folder"
+        "correct KERNELS_TO_LOAD or PATH_VALUES; relative paths are relative to the metakernel's folder"
     )]
     MissingKernel {
         /// Name with the path symbols replaced.
@@ -69,7 +69,7 @@ pub enum SpiceError {
     },
     /// A folder of kernels lacks a required one.
     #[error("no kernel in this folder {what}")]
-    #[cause("put the missing kernel under kernels.root, or name the kernels one by one")]
+    #[cause("put the missing kernel under kernels.root, or name the kernels individually")]
     NothingToSelect {
         /// The missing text, for example `defines the MGS clock (SCLK_DATA_TYPE_94)`.
         what: String,
@@ -88,8 +88,8 @@ pub enum SpiceError {
         set: Vec<String>,
     },
     /// A text is too long for CSPICE, or cannot be passed to it.
-    #[error("{what} cannot be given to CSPICE: {problem}")]
-    #[cause("use shorter paths without control characters, for example by a link")]
+    #[error("{what} cannot be passed to CSPICE: {problem}")]
+    #[cause("use shorter paths without control characters, for example through a symbolic link")]
     Unusable {
         /// The kind of text: a path, a clock string, ...
         what: &'static str,
@@ -98,7 +98,7 @@ pub enum SpiceError {
     },
     /// Kernels do not cover the required interval.
     #[error("no {what} of {of} for {gap} ({gap_utc}), required for {required}; {neighbours}")]
-    #[cause(Coverage: "add kernels that fill the gap, or leave out the image or profile that needs it")]
+    #[cause(Coverage: "add kernels that fill the gap, or omit the image or profile concerned")]
     CoverageGap {
         /// `position` or `attitude`.
         what: &'static str,
@@ -115,13 +115,13 @@ pub enum SpiceError {
     },
     /// Kernels hold the spacecraft, but not the Sun as Mars sees it.
     #[error(
-        "no position of the Sun as seen from Mars at {seen} (UTC {utc}); expected Mars in the kernels then, and the Sun \
-         when that light left it, {:.0} to {:.0} s earlier",
+        "no position of the Sun as seen from Mars at {seen} (UTC {utc}); expected kernels with Mars at this time and \
+         with the Sun {:.0} to {:.0} s earlier, when the light left the Sun",
         SUN_LIGHT_S[0], SUN_LIGHT_S[1]
     )]
     #[cause(
-        Coverage: "add an ephemeris of the Sun and of Mars that begins 14 minutes before the image, for example a planetary \
-                   one (de*.bsp)"
+        Coverage: "add an ephemeris of the Sun and Mars that begins 14 minutes before the image, for example a planetary \
+                   ephemeris (de*.bsp)"
     )]
     NoSun {
         /// Instant at which its light arrives at Mars.
@@ -130,7 +130,7 @@ pub enum SpiceError {
         utc: String,
     },
     /// No attitude sample within the tolerance.
-    #[error("no attitude of {of} within {tolerance_s} s of {kernel_time} (time of the C-kernel)")]
+    #[error("no attitude of {of} within {tolerance_s} s of {kernel_time} (C-kernel time)")]
     #[cause(like = CoverageGap)]
     NoAttitude {
         /// The spacecraft.
@@ -142,9 +142,7 @@ pub enum SpiceError {
     },
     /// A kernel holds NaN or an infinity.
     #[error("{what} at {instant} (UTC {utc}) is not finite{part}")]
-    #[cause(
-        "fetch the kernel again, or leave it out of the list: this part of it holds NaN or infinity"
-    )]
+    #[cause("fetch the kernel again, or omit it from the list: this part contains NaN or infinity")]
     NotFinite {
         /// The position, velocity or attitude concerned.
         what: String,
@@ -161,7 +159,7 @@ pub enum SpiceError {
          0.001 s"
     )]
     #[cause(
-        "fetch the current leap-second kernel from NAIF (naif0012.tls): this one lacks a leap second or was changed"
+        "fetch the current leap-second kernel from NAIF (naif0012.tls): the kernel in use lacks a leap second or was changed"
     )]
     OtherUtc {
         /// The first day that shows it.
@@ -171,10 +169,10 @@ pub enum SpiceError {
     },
     /// The kernels' motion cannot be tabulated to the tolerance.
     #[error(
-        "trajectory near {near}: positions and velocities of the kernels do not fit each other, {error_m:.3} m within {piece_s} s; \
+        "trajectory near {near}: positions and velocities in the kernels disagree by {error_m:.3} m within {piece_s} s; \
          expected at most {tolerance_m} m"
     )]
-    #[cause(Coverage: "check the SPK for jumps there, and that its positions are in kilometres and its velocities in kilometres per second")]
+    #[cause(Coverage: "check the SPK for jumps at this time, and for positions in kilometres and velocities in km/s")]
     NoConvergence {
         /// The instant.
         near: Et,
@@ -187,7 +185,7 @@ pub enum SpiceError {
     },
     /// Columns for a kernel writer do not fit together.
     #[error("segment {segment}: {problem}")]
-    #[cause(Bug: "report this: a kernel writer was given columns that do not fit")]
+    #[cause(Bug: "report this: a kernel writer received columns that do not match")]
     Segment {
         /// Name of the segment.
         segment: String,

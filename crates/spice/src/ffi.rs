@@ -3,11 +3,8 @@
 //! CSPICE keeps global state and is not thread safe. Every call is a method of [`Cspice`], and a
 //! `Cspice` exists only while the process-wide lock is held, so no call can happen without it.
 
-#![allow(unsafe_code, reason = "CSPICE is a C library, called only here")]
-#![allow(
-    clippy::unused_self,
-    reason = "a method needs `self` as the proof that the lock is held"
-)]
+#![allow(unsafe_code, reason = "CSPICE is a C library and is called only here")]
+#![allow(clippy::unused_self, reason = "`self` proves that the lock is held")]
 
 use std::{
     cell::Cell,
@@ -356,7 +353,7 @@ fn text_of(bytes: &[u8]) -> String {
 fn c_text(what: &'static str, text: &str) -> Called<CString> {
     if text.len() > PATH_LENGTH_MAX {
         let problem = format!(
-            "{} bytes long; expected at most {PATH_LENGTH_MAX}",
+            "its length is {} bytes; expected at most {PATH_LENGTH_MAX}",
             text.len()
         );
         return Err(SpiceError::Unusable { what, problem });

@@ -126,7 +126,7 @@ impl Session {
         let mut sentences = Vec::new();
         if let Some(index) = inside {
             sentences.push(format!(
-                "{} holds {} then, but no kernel links its centre to Mars",
+                "{} contains {} at this time, but no kernel links the centre of that segment to Mars",
                 name(index),
                 self.spacecraft().name
             ));
@@ -141,13 +141,13 @@ impl Session {
             let without = self.coverage()?.without_rates.iter();
             sentences.extend(without.map(|index| {
                 format!(
-                    "{} holds attitude without angular rates, which areograph does not read",
+                    "{} contains attitude without angular rates, which areograph does not read",
                     name(*index)
                 )
             }));
         }
         if sentences.is_empty() {
-            sentences.push("no loaded kernel contains it".to_owned());
+            sentences.push("no loaded kernel contains this interval".to_owned());
         }
         Ok(sentences.join(", "))
     }

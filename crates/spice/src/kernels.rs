@@ -119,7 +119,7 @@ impl KernelSet {
         if kernel.role == KernelRole::Meta {
             let error = SpiceError::NotAKernel {
                 found: "a metakernel".to_owned(),
-                expected: "a kernel; a metakernel is given alone and lists no other",
+                expected: "a kernel; a metakernel is given alone and lists no other metakernel",
             };
             return Err(error).in_file(path);
         }
@@ -129,7 +129,7 @@ impl KernelSet {
         if let Some(index) = self.kernels.iter().position(same) {
             let earlier = self.kernels.remove(index).file_name();
             self.explanation.push(format!(
-                "{earlier}: not loaded at its earlier place, same content as {name}"
+                "{earlier}: not loaded at its earlier position, same content as {name}"
             ));
         }
         self.kernels.push(kernel);
@@ -180,7 +180,7 @@ pub(super) fn role_of(path: &Path) -> Result<KernelRole> {
         bytes if bytes.starts_with(b"DAF/CK") => KernelRole::Ck,
         bytes if bytes.starts_with(b"DAF/PCK") => KernelRole::Pck,
         bytes if bytes.starts_with(b"DAFETF") || bytes.starts_with(b"DASETF") => {
-            return not_a_kernel(path, "a transfer file (make it binary with NAIF's tobin)");
+            return not_a_kernel(path, "a transfer file (convert it with NAIF's tobin)");
         }
         bytes if bytes.starts_with(b"NAIF/DA") || bytes.starts_with(b"DAS/") => {
             return not_a_kernel(path, "a binary NAIF file of a different kind");

@@ -62,7 +62,7 @@ impl KernelSet {
             }
         }
         for other in assignments.iter().filter(|found| !is_list_variable(found)) {
-            let line = format!("{list}: its variable {} is not loaded", other.name);
+            let line = format!("{list}: variable {} is not loaded", other.name);
             set.explanation.push(line);
         }
         Ok(set)
@@ -100,8 +100,8 @@ impl KernelSet {
             let parts = parts.into_iter().map(|part| part + "+").chain(last);
             parts.map(|part| format!("      '{}'\n", part.replace('\'', "''")))
         });
-        let before = "KPL/MK\n\nKernels of an areograph run, in load order. Relative paths count \
-                      from this file's folder.\n\n";
+        let before = "KPL/MK\n\nKernels of an areograph run, in load order. Relative paths are \
+                      relative to the folder of this file.\n\n";
         [before.to_owned()]
             .into_iter()
             .chain(described)
@@ -149,7 +149,7 @@ fn listed_names(assignments: &[Assignment]) -> std::result::Result<Vec<String>, 
     match names.iter().find(|name| name.starts_with('$')) {
         Some(name) => Err(SpiceError::NotAKernel {
             found: format!("a metakernel that names {name}"),
-            expected: "that path symbol in PATH_SYMBOLS, with its value in PATH_VALUES",
+            expected: "this path symbol in PATH_SYMBOLS, with its value in PATH_VALUES",
         }),
         None => Ok(names),
     }
@@ -179,7 +179,7 @@ fn strings(
     }
     if !begun.is_empty() {
         return Err(SpiceError::NotAKernel {
-            found: format!("a metakernel whose {variable} ends with '+'"),
+            found: format!("a metakernel in which {variable} ends with '+'"),
             expected: "another string after it",
         });
     }
@@ -207,7 +207,7 @@ fn same_name(written: &Path, name: &str) -> std::result::Result<PathBuf, SpiceEr
         format!(" (looked in {})", folder.display())
     } else {
         let names: Vec<String> = similar.iter().map(|p| p.display().to_string()).collect();
-        format!("; it could mean any of {}", names.join(", "))
+        format!("; possible files: {}", names.join(", "))
     };
     Err(SpiceError::MissingKernel {
         name: name.to_owned(),

@@ -240,7 +240,7 @@ fn select_ephemerides(
     {
         let names: Vec<String> = of_spacecraft.map(|(path, _)| file_name(path)).collect();
         let what = format!(
-            "holds the orbit of {} in the solution {family} (found: {})",
+            "contains the orbit of {} in the solution {family} (found: {})",
             SPACECRAFT.name,
             names.join(", ")
         );
@@ -272,7 +272,7 @@ fn select_ephemerides(
         let own = holds_spacecraft(segments);
         let name = file_name(path);
         if !fits(path, segments) {
-            let line = format!("{name}: not used, not of the orbit solution {family}");
+            let line = format!("{name}: not used, not from the orbit solution {family}");
             set.set.explanation.push(line);
         } else if touches(segments) {
             let reason = if own {
@@ -282,9 +282,12 @@ fn select_ephemerides(
             };
             set.add(path, &reason)?;
         } else if meets(&held_by(segments, |target| target == NAIF_SUN), &no_sun) {
-            set.add(path, "the Sun when its light left for Mars")?;
+            set.add(
+                path,
+                "position of the Sun when the light that reaches Mars left it",
+            )?;
         } else {
-            let line = format!("{name}: not used, holds none of the required times");
+            let line = format!("{name}: not used, contains none of the required times");
             set.set.explanation.push(line);
         }
     }
@@ -345,7 +348,8 @@ fn select_attitudes(
             let hull = hull.map(|(first, last)| interval_of([first[0], last[1]]));
             let hull = Intervals::union_of(hull);
             if hull.intersection(required).as_slice().is_empty() {
-                let line = format!("{name}: not used, holds no attitude near the required times");
+                let line =
+                    format!("{name}: not used, contains no attitude near the required times");
                 set.set.explanation.push(line);
                 continue;
             }

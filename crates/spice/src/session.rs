@@ -334,7 +334,7 @@ impl Session {
             let bus = self.spacecraft.bus;
             let (set, cspice) = (self.kernels(), self.cspice());
             let origin = origin::of_attitude(set, cspice, bus, kernel_time, reach_s);
-            let what = format!("attitude of {} or its rate", self.spacecraft.name);
+            let what = format!("attitude or attitude rate of {}", self.spacecraft.name);
             return Err(self.not_finite(what, kernel_time, origin));
         }
         Ok(Attitude {

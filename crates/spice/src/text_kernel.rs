@@ -56,7 +56,7 @@ pub(super) fn assignments(text: &str) -> Result<Vec<Assignment>, SpiceError> {
     let mut found = Vec::new();
     while let Some((line, token)) = tokens.next() {
         let Token::Word(name) = token else {
-            return Err(fault(line, format!("{token:?} where a name is expected")));
+            return Err(fault(line, format!("found {token:?}; expected a name")));
         };
         let append = match tokens.next() {
             Some((_, Token::Equals)) => false,
@@ -72,7 +72,12 @@ pub(super) fn assignments(text: &str) -> Result<Vec<Assignment>, SpiceError> {
                     Some((_, Token::Word(word))) => values.push(Value::Plain(word)),
                     Some((_, Token::Text(text))) => values.push(Value::Text(text)),
                     Some((_, Token::Close)) => break,
-                    _ => return Err(fault(line, format!("list of {name} is not closed by ')'"))),
+                    _ => {
+                        return Err(fault(
+                            line,
+                            format!("the list of {name} is not closed by ')'"),
+                        ));
+                    }
                 }
             },
             _ => return Err(fault(line, format!("no value for {name}"))),
@@ -146,7 +151,7 @@ fn quoted(line: usize, rest: &str) -> Result<(Token, usize), SpiceError> {
     }
     Err(fault(
         line,
-        "string without its closing quote on the same line".to_owned(),
+        "string without a closing quote on the same line".to_owned(),
     ))
 }
 
@@ -197,7 +202,7 @@ mod tests {
         for (text, expected) in [
             (
                 "\\begindata\nA = 'x",
-                "line 2: string without its closing quote on the same line",
+                "line 2: string without a closing quote on the same line",
             ),
             (
                 "\\begindata\n\nA = ( 1",

@@ -230,7 +230,7 @@ fn check_lengths<T>(name: &str, instants: &[T], columns: &[usize]) -> Result<()>
     let problem = if name.is_empty() || name.len() > SEGMENT_NAME_MAX {
         format!("its name must have 1 to {SEGMENT_NAME_MAX} characters")
     } else if instants.is_empty() {
-        "it holds no instants".to_owned()
+        "it contains no instants".to_owned()
     } else if let Some(count) = columns.iter().find(|count| **count != instants.len()) {
         format!("column of {count} values for {} instants", instants.len())
     } else {

@@ -36,7 +36,9 @@ impl Cause for Question {
             DataFusionError::ResourcesExhausted(_) => {
                 "select fewer columns, or sort and group fewer rows in one query"
             }
-            DataFusionError::IoError(_) => "check the disk of temporary files, then retry",
+            DataFusionError::IoError(_) => {
+                "check the disk that contains the temporary files, then retry"
+            }
             _ => "\"describe shots\" lists the columns; text is written in 'single quotes'",
         }
         .to_owned()

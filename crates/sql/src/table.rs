@@ -73,8 +73,8 @@ pub struct Tally {
 
 /// Two files hold the same shots.
 #[derive(Debug, thiserror::Error, Cause)]
-#[error("record {record} has a shot that is also in {other}: it would be counted twice")]
-#[cause(Input: "if both files hold the same orbits, name only one of them, or select one source_file")]
+#[error("record {record} contains a shot that is also in {other} and would be counted twice")]
+#[cause(Input: "if both files contain the same orbits, name only one of the files, or select one source_file")]
 struct Overlap {
     record: u32,
     other: String,

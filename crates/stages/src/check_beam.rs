@@ -107,11 +107,11 @@ pub enum BeamGap {
 impl fmt::Display for BeamGap {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter.write_str(match self {
-            Self::Support => "support data do not state the attitude of the bus",
+            Self::Support => "support data do not state the bus attitude",
             Self::OtherSpacecraft => "another spacecraft carries the laser",
-            Self::NoBeam => "the altimeter file does not state where the beam points (beam.bus)",
+            Self::NoBeam => "the altimeter file does not state the beam direction (beam.bus)",
             Self::NoShot => "no shot was fired during the exposure",
-            Self::NoPosition => "the shots do not state the position of the spacecraft",
+            Self::NoPosition => "the shots do not state the spacecraft position",
         })
     }
 }

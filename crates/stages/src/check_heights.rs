@@ -57,16 +57,16 @@ pub struct HeightCheck {
     pub apart: Option<ProfilesApart>,
 }
 
-/// The surface that heights are compared with.
+/// Surface with which heights are compared.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SurfaceFigures {
     /// Shots.
     pub shots: usize,
-    /// Profiles that they belong to.
+    /// Number of profiles to which these shots belong.
     pub profiles: usize,
     /// Root mean square difference of heights 300 m apart, metres.
     pub roughness_m: f64,
-    /// Root mean square slope at the tie points, metres per metre on each axis.
+    /// Root mean square slope along each axis at the tie points, metres per metre.
     pub slope: f64,
 }
 
@@ -102,9 +102,9 @@ pub struct ProfilesApart {
     pub profiles: [String; 2],
     /// Mean height of the first surface above the second, metres.
     pub mean_m: f64,
-    /// Standard deviation of that, metres.
+    /// Standard deviation of this mean height, metres.
     pub sigma_m: f64,
-    /// Pairs of profiles that were compared.
+    /// Number of pairs of profiles that were compared.
     pub pairs: usize,
 }
 

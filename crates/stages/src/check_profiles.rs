@@ -64,31 +64,31 @@ pub struct ProfileCrossover {
     pub sigma_m: f64,
 }
 
-/// The shift of a profile.
+/// Shift of a profile.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ShiftedProfile {
     /// Identifier.
     pub profile: String,
     /// Crossovers.
     pub crossovers: usize,
-    /// Offset of its recorded from its true position to the east, to the north and upwards, metres.
+    /// Offset of the recorded from the true position of the profile in east, north and height, metres.
     pub shift_m: [f64; 3],
     /// Covariance of this offset, m².
     pub covariance_m2: [[f64; 3]; 3],
 }
 
-/// A profile that does not belong to the others.
+/// A profile that is rejected because it contradicts the profiles that it crosses.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LeftOutProfile {
     /// Identifier.
     pub profile: String,
-    /// Crossovers with the profiles that it crosses.
+    /// Number of crossovers with other profiles.
     pub crossovers: usize,
-    /// The profiles that it crosses.
+    /// Identifiers of the profiles that it crosses.
     pub others: Vec<String>,
-    /// Its height above theirs, metres.
+    /// Height of the profile above the others, metres.
     pub above_m: f64,
-    /// Standard deviation of that, metres.
+    /// Standard deviation of this height, metres.
     pub sigma_m: f64,
 }
 
@@ -103,7 +103,8 @@ impl ProfileCheck {
         let named: Vec<String> = named.collect();
         (!named.is_empty()).then(|| {
             format!(
-                "profiles lie above or below all profiles that they cross, and the surface between shots does not use them: {}",
+                "profiles that lie above or below all profiles that they cross and are rejected for the surface \
+                 between shots: {}",
                 named.join(", ")
             )
         })
@@ -119,9 +120,9 @@ pub struct WithheldStretch {
     pub shots: usize,
     /// Mean of measured minus predicted heights, metres.
     pub above_m: f64,
-    /// Standard deviation of that as the surface states it, metres.
+    /// Standard deviation of this mean according to the surface, metres.
     pub sigma_m: f64,
-    /// Distance of the nearest shot of another profile, metres.
+    /// Distance to the nearest shot of another profile, metres.
     pub nearest_shot_m: f64,
 }
 

@@ -71,7 +71,7 @@ impl Stage for ConvertDatum<'_> {
         footprints.ground = *self.ground;
         let choice = footprints.ground_choice();
         let mut converted = convert_datum(footprints, self.altimeter_clock);
-        let note = |of: GroundRadius| format!("radii of the ground are those {}", of.words());
+        let note = |of: GroundRadius| format!("ground radii are used {}", of.words());
         converted.notes.extend(choice.map(note));
         Ok(converted)
     }
@@ -263,9 +263,11 @@ fn note(body: Body, name: &str, datum: Datum, turn_s: Option<f64>) -> String {
     let frame = &body.names().short_frame;
     match turn_s {
         None if datum == body.datum() => format!("{name}: in {frame} already, not converted"),
-        None => format!("{name}: {datum} to {frame} at each shot's time tag"),
+        None => format!("{name}: converted from {datum} to {frame} at each shot's time tag"),
         Some(turn_s) => {
-            format!("{name}: out of {datum} at the time tag, into {frame} {turn_s:+.3} s later")
+            format!(
+                "{name}: converted from {datum} at the time tag, to {frame} {turn_s:+.3} s later"
+            )
         }
     }
 }

@@ -151,8 +151,8 @@ fn rates_note(session: &Session, without: &BTreeSet<usize>) -> Option<String> {
         .collect();
     (!names.is_empty()).then(|| {
         format!(
-            "{}: attitudes without angular rates, which are not read; where another C-kernel covers the time, its \
-             attitude is used",
+            "{}: attitudes without angular rates are not read; if another C-kernel covers the time, its attitudes are \
+             used",
             names.join(", ")
         )
     })
@@ -179,7 +179,7 @@ fn pck_note(body: Body, session: &Session, positions: &Intervals) -> Option<Stri
     let turn_rad = rotation_vector(&(theirs * ours.transpose())).norm();
     (turn_rad > PCK_TOLERANCE_RAD).then(|| {
         format!(
-            "the PCK turns {} by {:.5}° against {frame}; products use the {frame} constants",
+            "the PCK rotates {} by {:.5}° relative to {frame}; products use the {frame} constants",
             body.naif().pck_frame,
             turn_rad / RADIANS_PER_DEGREE,
             frame = body.names().short_frame

@@ -144,7 +144,7 @@ impl RotationVectorModel {
 #[error(
     "image {image}: {samples} orientation samples do not determine a polynomial of order {order}"
 )]
-#[cause(Input: "raise orientation.intervals, and check that the image has more than a few lines")]
+#[cause(Input: "increase orientation.intervals, and check that the image has more than a few lines")]
 struct Undetermined {
     image: String,
     samples: usize,
@@ -218,7 +218,7 @@ pub fn fit_sensor_model(
         None => (
             CameraModel::Samples,
             Some(format!(
-                "{}: this image is interpolated between its samples",
+                "{}: the orientation of this image is interpolated between its samples",
                 broken.join("; ")
             )),
         ),
@@ -417,7 +417,7 @@ fn advice(orientation: &Orientation) -> String {
     };
     if exposed_s > LONG_S {
         format!(
-            "; over {exposed_s:.0} s an orbit departs from any polynomial of second order: remove registration.model, or \
+            "; over {exposed_s:.0} s an orbit departs from any second-order polynomial: remove registration.model, or \
              set it to \"samples\", which follows the orbit"
         )
     } else {
@@ -430,7 +430,7 @@ fn of_tables(orientation: &Orientation) -> Option<String> {
     let interpolation = &orientation.tables.interpolation;
     (!interpolation.keeps_limit()).then(|| {
         format!(
-            "camera tables interpolate with errors up to {:.4} pixels even with a node per line; limit {} pixels",
+            "interpolation errors of camera tables reach {:.4} pixels even with one node per line; limit {} pixels",
             interpolation.error_max_px,
             InterpolationCheck::LIMIT_PX
         )

@@ -44,7 +44,7 @@ pub struct Profile {
 pub struct SimultaneousImage {
     /// Index of the image.
     pub image: usize,
-    /// Shots of the profile fired while the image was exposed.
+    /// Number of shots of the profile that were fired while the image was exposed.
     pub shots: u32,
 }
 

@@ -149,8 +149,8 @@ impl Evidence<'_> {
     /// States why no footprint is in a window, and what to check.
     fn no_footprint(&self) -> String {
         if self.rejected.is_empty() {
-            return "no footprint in any window: check windows, and that the shot files (pedr.files or shots.files) \
-                belong to the site's orbits".to_owned();
+            return "no footprint in any window: check the windows, and check that the shot files (pedr.files or \
+                shots.files) belong to the site's orbits".to_owned();
         }
         let counts = self
             .rejected
@@ -158,12 +158,12 @@ impl Evidence<'_> {
             .map(|(reason, count)| format!("{count} ({reason})"));
         let counts: Vec<String> = counts.collect();
         let check = if self.rejected.contains_key(&ShotRejection::Spoiled) {
-            "radii, ranges and positions of spoiled shots contradict each other: check their units and their reference sphere"
+            "radii, ranges and positions of spoiled shots contradict each other: check their units and reference sphere"
         } else {
             "check pedr.filter"
         };
         format!(
-            "no footprint in any window: all shots there are left out, {}; {check}",
+            "no footprint in any window: all shots in the windows are rejected, {}; {check}",
             counts.join(", ")
         )
     }

@@ -18,7 +18,7 @@ use areograph_store::{
 
 /// An image whose edges do not all see Mars.
 #[derive(Debug, thiserror::Error, Cause)]
-#[error("window {window}: a corner of image {image} sees no ground")]
+#[error("window {window}: a corner of image {image} shows no ground")]
 #[cause(Input: "give this window its own edges or polygon")]
 struct NoGround {
     window: String,

@@ -216,8 +216,8 @@ fn passes_off_nadir(footprints: &mut Footprints<AsRead>) -> Option<String> {
     let passes: Vec<String> = passes.collect();
     (!passes.is_empty()).then(|| {
         format!(
-            "passes off nadir, with ranges too long for the orbit of the others: {}; their spacecraft was not above \
-             the footprint",
+            "off-nadir passes, with ranges too long for the orbit of the other passes: {}; the spacecraft was not \
+             above the footprints",
             passes.join(", ")
         )
     })
@@ -328,8 +328,8 @@ impl Gathered<'_> {
         if self.layouts.contains(&true) {
             notes.push(
                 "Tables of the Orbital Data Explorer: planet_rad, corrected by crossovers, serves as both radii, and \
-                 topography is taken from the table; the spacecraft is placed on the radius through the footprint at \
-                 the range (nadir by range), because the tables do not state its position"
+                 topography is taken from the table; the spacecraft position is assumed on the radius through the \
+                 footprint, at the measured range (nadir by range), because the tables do not state its position"
                     .to_owned(),
             );
             if !self.layouts.contains(&false) {
@@ -352,7 +352,7 @@ impl Gathered<'_> {
         }
         if self.repeated > 0 {
             notes.push(format!(
-                "{} rows in the windows repeat another one and are counted once",
+                "{} rows in the windows duplicate other rows and are counted once",
                 self.repeated
             ));
         }

@@ -36,7 +36,7 @@ pub struct Ties {
     pub points: Vec<TiePoint>,
     /// Measurements in images that the site does not have, by the name in the file.
     pub elsewhere: BTreeMap<String, u64>,
-    /// Measurements and points that their network marks as ignored.
+    /// Measurements and points that the network marks as ignored.
     pub ignored: u64,
     /// Complaints about malformed records; at most 1000 are kept.
     pub complaints: Vec<String>,
@@ -223,7 +223,7 @@ impl Ties {
         let mut notes: Vec<String> = copies.map(|copy| format!("tie points: {copy}")).collect();
         if elsewhere > 0 {
             notes.push(format!(
-                "tie points: {elsewhere} measurements in {} images that the site does not have",
+                "tie points: {elsewhere} measurements in {} images that do not belong to the site",
                 self.elsewhere.len()
             ));
         }
@@ -234,14 +234,14 @@ impl Ties {
             .collect();
         if !known.is_empty() {
             notes.push(format!(
-                "tie points: {} have known ground coordinates, {} of them held fixed",
+                "tie points: {} have known ground coordinates, {} of which are fixed",
                 known.len(),
                 known.iter().filter(|fixed| **fixed).count()
             ));
         }
         if self.ignored > 0 {
             notes.push(format!(
-                "tie points: {} points and measurements that their network marks as ignored",
+                "tie points: {} points and measurements that the network marks as ignored",
                 self.ignored
             ));
         }

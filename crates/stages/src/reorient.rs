@@ -49,7 +49,7 @@ pub struct LineCorrection {
 #[cause(Bug: "report this with the site's configuration and the log")]
 enum ReorientError {
     #[error(
-        "image {image}: lines shifted by {shift_lines:.3} lines need the orientation over {required}; expected within \
+        "image {image}: a shift by {shift_lines:.3} lines requires the orientation over {required}; expected within \
          the camera tables, {known}"
     )]
     #[cause(Input: "check the image's start time, or give its time bias a smaller standard deviation")]

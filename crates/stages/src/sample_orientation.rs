@@ -246,8 +246,8 @@ impl fmt::Display for HeldAttitudes {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             formatter,
-            "{} of {} attitudes lie outside the C-kernels' intervals, up to {:.3} s; within \
-             kernels.ck_tolerance_s the nearest one is used, although the bus rotates",
+            "{} of {} attitudes lie outside the C-kernels' intervals, by up to {:.3} s; within kernels.ck_tolerance_s, \
+             the nearest attitude is used, although the bus rotates",
             self.lookups, self.of, self.distance_max_s
         )
     }

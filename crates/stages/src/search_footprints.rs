@@ -46,7 +46,7 @@ pub struct SearchResult {
     pub complaints: Vec<Complaint>,
     /// All complaints by reason.
     pub complaint_counts: BTreeMap<Reason, u64>,
-    /// Rejected shots inside a window, by reason.
+    /// Numbers of rejected shots in the windows, by reason.
     pub rejected: BTreeMap<ShotRejection, u64>,
     /// Records read.
     pub frames_read: u64,
@@ -243,7 +243,7 @@ impl Gathered<'_> {
         let original = copies.original_of(index, &enlisted.blake3, enlisted.datum);
         if let Some(original) = original {
             self.copy_notes.push(format!(
-                "PEDR file {} ({}) holds the same bytes as file {} ({}): read once",
+                "PEDR file {} ({}) is identical to file {} ({}) and is read once",
                 index + 1,
                 enlisted.name,
                 original + 1,

@@ -338,7 +338,7 @@ fn lines_delivered(
     }
     if delivered < header {
         notes.push(format!(
-            "{} of {header} header lines are not in the delivered file; times count header lines",
+            "{} of {header} header lines are not in the delivered file; line times refer to header lines",
             header - delivered
         ));
     }
@@ -357,7 +357,7 @@ fn labelled(image: &ImageConfig) -> Result<(Instrument, Option<ImageLabel>)> {
         None => built_in_instruments(),
     };
     let label = read_label(path, cameras)?;
-    of_one_product(image, ("label is that", label.product_id.as_deref()))?;
+    of_one_product(image, ("label belongs to", label.product_id.as_deref()))?;
     Ok((label.instrument.clone(), Some(label)))
 }
 
@@ -412,7 +412,9 @@ fn start_time(
     };
     let Some(sclk) = fields.sclk_start.as_deref() else {
         if from_utc.is_some() && session.spacecraft().labels_tell_clock {
-            notes.push("start from UTC, truncated to 10 ms in labels; no clock string".to_owned());
+            notes.push(
+                "start time from UTC, which labels truncate to 10 ms; no clock string".to_owned(),
+            );
         }
         return Ok(from_utc.map(|(_, start)| (start, StartFrom::Utc)));
     };

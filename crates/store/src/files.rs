@@ -75,7 +75,7 @@ struct ChangedFile {
 
 /// A file outside the permitted folders.
 #[derive(Debug, thiserror::Error)]
-#[error("a path below {}; this one leads to {}", listed(.roots), .leads_to.display())]
+#[error("a path below {}; this path leads to {}", listed(.roots), .leads_to.display())]
 pub struct Outside {
     leads_to: PathBuf,
     roots: Vec<PathBuf>,
@@ -83,8 +83,8 @@ pub struct Outside {
 
 /// An input file that a run must not read.
 #[derive(Debug, thiserror::Error, Cause)]
-#[error("is not read here; expected {0}")]
-#[cause(Configuration: "move the file below one of these folders, or have its folder added to them")]
+#[error("lies outside the permitted folders; expected {0}")]
+#[cause(Configuration: "move the file into one of these folders, or have its folder added to the permitted folders")]
 struct NotAdmitted(Outside);
 
 /// Reason why the file must not be read, if it lies below none of the folders `roots`, links followed. Without folders

@@ -93,7 +93,7 @@ impl HashCache {
             return;
         }
         if let Err(failure) = self.add(&learnt) {
-            tracing::warn!("hashes of input files are not kept: {failure}");
+            tracing::warn!("hashes of input files cannot be stored: {failure}");
         }
     }
 
@@ -109,7 +109,7 @@ impl HashCache {
         // The folder belongs to areograph, and an incomplete file is treated as absent.
         let written = File::create(&self.path).and_then(|mut file| file.write_all(&bytes));
         if let Err(failure) = written {
-            tracing::warn!("hashes of products are not kept: {failure}");
+            tracing::warn!("hashes of products cannot be stored: {failure}");
         }
     }
 

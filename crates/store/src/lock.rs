@@ -19,7 +19,7 @@ pub struct SiteLock {
 /// Another run is using the folder.
 #[derive(Debug, thiserror::Error, Cause)]
 #[error("another run is using this folder")]
-#[cause(Io: "wait for it, or give this run another --out")]
+#[cause(Io: "wait for the other run, or give this run a different --out")]
 pub struct Busy;
 
 impl Busy {

@@ -39,14 +39,14 @@ pub struct Manifest {
     pub biases: Vec<BiasEntry>,
     /// Kernels in load order.
     pub kernels: Vec<KernelEntry>,
-    /// Rival kernel sets, and the one that was used; empty if the configuration names one source of kernels.
+    /// Rival kernel sets, and the set that was used; empty if the configuration names one source of kernels.
     pub kernel_choice: Vec<KernelChoiceEntry>,
     /// Stages with the fingerprint of all their inputs.
     pub stages: Vec<StageEntry>,
     /// Product files.
     #[schemars(length(min = 1))]
     pub products: Vec<ProductEntry>,
-    /// Numbers of rows and of other items.
+    /// Numbers of rows and other items.
     pub counts: BTreeMap<String, u64>,
     /// The largest figures of the site under the names in [`figures`]; absent without figures.
     #[schemars(schema_with = "figures::schema")]
@@ -76,21 +76,21 @@ pub mod figures {
     pub const ALONG_TRACK_PARALLAX_M: &str = "along_track_parallax_m";
     /// Largest along-track parallax of two images at their tie points, adjusted orientation, metres.
     pub const ADJUSTED_ALONG_TRACK_PARALLAX_M: &str = "adjusted_along_track_parallax_m";
-    /// |Median| height of tie points above the MOLA surface, metres.
+    /// Magnitude of the median height of tie points above the MOLA surface, metres.
     pub const HEIGHT_OFF_SURFACE_M: &str = "height_off_surface_m";
-    /// |Median| height of tie points above the MOLA surface, adjusted orientation, metres.
+    /// Magnitude of the median height of tie points above the MOLA surface, adjusted orientation, metres.
     pub const ADJUSTED_HEIGHT_OFF_SURFACE_M: &str = "adjusted_height_off_surface_m";
     /// A posteriori standard deviation of unit weight of the adjustment.
     pub const ADJUSTMENT_SIGMA0: &str = "adjustment_sigma0";
 
-    /// Root mean square deviation of tie-point images in a net of pictures, the larger coordinate, metres.
+    /// Root mean square deviation of tie-point images in a net of pictures, larger of both coordinates, metres.
     pub const TIE_DEVIATION_RMS_M: &str = "tie_deviation_rms_m";
-    /// Root mean square residual of the kept controls of a net, the larger coordinate, metres.
+    /// Root mean square residual of the kept controls of a net, larger of both coordinates, metres.
     pub const CONTROL_RESIDUAL_RMS_M: &str = "control_residual_rms_m";
 
-    /// Root mean square residual of tie points in a calibrated camera, the largest of all lines and axes, pixels.
+    /// Largest root mean square residual of tie points among the lines and axes of a calibrated camera, pixels.
     pub const TIE_RESIDUAL_RMS_PX: &str = "tie_residual_rms_px";
-    /// Root mean square height of withheld control of a calibration, intersected minus the laser's, metres.
+    /// Root mean square of intersected minus laser height at withheld control of a calibration, metres.
     pub const HELD_BACK_HEIGHT_RMS_M: &str = "held_back_height_rms_m";
 
     /// Root mean square of terrain model minus laser at shots withheld from a match, bias removed, metres.
@@ -124,11 +124,11 @@ pub mod figures {
         ),
         (
             HEIGHT_OFF_SURFACE_M,
-            "|Median| height of tie points above the MOLA surface, metres.",
+            "Magnitude of the median height of tie points above the MOLA surface, metres.",
         ),
         (
             ADJUSTED_HEIGHT_OFF_SURFACE_M,
-            "|Median| height of tie points above the MOLA surface, adjusted orientation, metres.",
+            "Magnitude of the median height of tie points above the MOLA surface, adjusted orientation, metres.",
         ),
         (
             ADJUSTMENT_SIGMA0,
@@ -136,19 +136,19 @@ pub mod figures {
         ),
         (
             TIE_DEVIATION_RMS_M,
-            "Root mean square deviation of tie-point images in a net of pictures, the larger coordinate, metres.",
+            "Root mean square deviation of tie-point images in a net of pictures, larger of both coordinates, metres.",
         ),
         (
             CONTROL_RESIDUAL_RMS_M,
-            "Root mean square residual of the kept controls of a net, the larger coordinate, metres.",
+            "Root mean square residual of the kept controls of a net, larger of both coordinates, metres.",
         ),
         (
             TIE_RESIDUAL_RMS_PX,
-            "Root mean square residual of tie points in a calibrated camera, the largest of all lines and axes, pixels.",
+            "Largest root mean square residual of tie points among the lines and axes of a calibrated camera, pixels.",
         ),
         (
             HELD_BACK_HEIGHT_RMS_M,
-            "Root mean square height of withheld control of a calibration, intersected minus the laser's, metres.",
+            "Root mean square of intersected minus laser height at withheld control of a calibration, metres.",
         ),
     ];
 
@@ -183,7 +183,7 @@ pub struct BiasEntry {
     pub name: String,
     /// Seconds added to the time of a look-up.
     pub correction_s: f64,
-    /// The look-ups or computations to which it applies.
+    /// Look-ups or computations to which the correction applies.
     pub scope: String,
     /// Source of the value.
     pub source: String,
@@ -201,33 +201,33 @@ pub struct KernelEntry {
     /// BLAKE3 of the file.
     #[schemars(regex(pattern = "^[0-9a-f]{64}$"))]
     pub blake3: String,
-    /// Needed intervals that were read from this kernel, ET seconds: later kernels take precedence.
+    /// Required intervals that were read from this kernel, ET seconds: later kernels take precedence.
     pub coverage_used: Vec<Interval>,
 }
 
-/// One of several kernel sets, compared over the positions that the site needs.
+/// One of several kernel sets, compared over the positions that the site requires.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct KernelChoiceEntry {
     /// Identifier in the configuration.
     pub set: String,
-    /// Whether it was used: its trajectory is closest to the mean of all, by root mean square distance.
+    /// Whether the set was used: its trajectory has the smallest root mean square distance from the mean of all sets.
     pub chosen: bool,
     /// Instants at which all sets were compared.
     #[schemars(range(min = 1))]
     pub epochs: u64,
-    /// Root mean square distance from the mean of all, metres.
+    /// Root mean square distance from the mean of all sets, metres.
     #[schemars(range(min = 0.0))]
     pub distance_rms_m: f64,
-    /// Largest distance from the mean of all, metres.
+    /// Largest distance from the mean of all sets, metres.
     #[schemars(range(min = 0.0))]
     pub distance_max_m: f64,
-    /// Mean radial deviation from the mean of all, metres.
+    /// Mean radial deviation from the mean of all sets, metres.
     pub radial_mean_m: f64,
-    /// Mean deviation along the track, metres.
+    /// Mean along-track deviation from the mean of all sets, metres.
     pub along_track_mean_m: f64,
-    /// Mean deviation across the track, along the orbit's normal, metres.
+    /// Mean deviation from the mean of all sets along the orbit normal, metres.
     pub cross_track_mean_m: f64,
-    /// Its ephemerides in load order.
+    /// Ephemerides of the set in load order.
     pub ephemerides: Vec<FileEntry>,
 }
 
@@ -244,7 +244,7 @@ pub struct FileEntry {
 /// A stage of a run.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct StageEntry {
-    /// Name, for a stage of one image followed by `/` and the image.
+    /// Name; for a stage of one image, followed by `/` and the image.
     pub name: String,
     /// BLAKE3 over its parts.
     #[schemars(regex(pattern = "^[0-9a-f]{64}$"))]
@@ -254,14 +254,14 @@ pub struct StageEntry {
 /// A product file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct ProductEntry {
-    /// Path below the site's folder, with `/`.
+    /// Path below the site's folder, with `/` as separator.
     pub path: String,
     /// Size.
     pub bytes: u64,
     /// BLAKE3 of the file.
     #[schemars(regex(pattern = "^[0-9a-f]{64}$"))]
     pub blake3: String,
-    /// Rows, or 1 for a document.
+    /// Number of rows; 1 for a document.
     pub rows: u64,
 }
 

@@ -27,7 +27,7 @@ pub const PAGE: Mark = Mark {
 #[cause(Configuration)]
 pub enum PageError {
     /// It would replace something other than a file.
-    #[error("is {found}; a page can replace a regular file only")]
+    #[error("is {found}; a page can replace only a regular file")]
     #[cause("name a file for --page, in a folder that exists")]
     NotAFile {
         /// The existing entry.

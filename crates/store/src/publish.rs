@@ -168,8 +168,8 @@ pub fn entries(staging: &Path, files: &[(PathBuf, u64)]) -> Result<Vec<ProductEn
 
 /// Products of a different kind in the folder, which a publication would remove.
 #[derive(Debug, thiserror::Error, Cause)]
-#[error("the folder contains other products: {name}, made by {stage}")]
-#[cause(Configuration: "give it another name, or its products another folder (--out)")]
+#[error("the folder contains other products: {name}, created by {stage}")]
+#[cause(Configuration: "choose a different name, or a different folder for the products (--out)")]
 struct OtherKind {
     name: String,
     stage: String,
@@ -214,9 +214,9 @@ fn require_same_kind(site_folder: &Path, next: &Manifest) -> Result<()> {
 /// A file in the place of a product that no record of areograph names.
 #[derive(Debug, thiserror::Error, Cause)]
 #[error(
-    "is in the place of a product and was not written by areograph; expected a new path, or a product of an earlier run"
+    "occupies the path of a product, but was not written by areograph; expected a new path, or a product of an earlier run"
 )]
-#[cause(Configuration: "move the file away, or give the products another folder (--out)")]
+#[cause(Configuration: "move the file, or choose a different folder for the products (--out)")]
 struct InPlaceOfProduct;
 
 /// Ensures that a publication replaces only products, or files that equal them.

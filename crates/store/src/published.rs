@@ -15,7 +15,7 @@ use areograph_base::error::{Cause, IoError, Locate, Result};
 pub enum PublishedError {
     /// Nothing was published.
     #[error("there is no {MANIFEST}, so there are no products")]
-    #[cause("name a site's folder of products, and run the site to the end")]
+    #[cause("name the product folder of a site, and run the site to the end")]
     NoManifest,
     /// A run was killed, or is in progress, while files received their final names.
     #[error("the publication of products into this folder was not finished")]
@@ -23,7 +23,7 @@ pub enum PublishedError {
     Unfinished,
     /// The manifest is damaged, or of a version with other entries.
     #[error("this is not a manifest of areograph {}: {reason}", env!("CARGO_PKG_VERSION"))]
-    #[cause("run the site again: damaged products are written anew")]
+    #[cause("run the site again: damaged products are rewritten")]
     Unreadable {
         /// The parser's reason, with line and column.
         reason: String,
@@ -37,7 +37,7 @@ pub enum PublishedError {
     },
     /// A product differs from the published one.
     #[error(
-        "{found}; expected {expected_bytes} bytes with the BLAKE3 hash {expected} of {MANIFEST}"
+        "{found}; expected {expected_bytes} bytes with the BLAKE3 hash {expected}, as in {MANIFEST}"
     )]
     #[cause(like = Unreadable)]
     Contradicts {

@@ -17,8 +17,8 @@ pub fn is_up_to_date(relative: &str, expected: &str) {
     let line = differs.unwrap_or_else(|| found.lines().count().min(expected.lines().count()));
     assert!(
         found == expected,
-        "{relative}: line {} is {:?}, the declarations give {:?}; rewrite it with \
-         `SNAPSHOTS=overwrite` and the same test",
+        "{relative}: line {} is {:?}; expected {:?} from the declarations; regenerate the file \
+         with `SNAPSHOTS=overwrite` and the same test",
         line + 1,
         found.lines().nth(line),
         expected.lines().nth(line),

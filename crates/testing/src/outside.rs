@@ -29,7 +29,7 @@ pub fn found(test: &str) {
 }
 
 /// The test is skipped, for this reason.
-#[allow(clippy::print_stderr, reason = "tests report what they skip")]
+#[allow(clippy::print_stderr, reason = "skipped tests are reported")]
 pub fn skipped(test: &str, why: &str) {
     eprintln!("skipped {test}: {why}");
     note("skipped", test, why);

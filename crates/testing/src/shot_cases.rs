@@ -60,12 +60,12 @@ pub const CASES: &[Case] = &[
         shared: Some([0, 1]),
     },
     Case {
-        name: "0.05 s apart, half the time between two shots",
+        name: "files 0.05 s apart, half the time between two shots",
         files: &[&[(0, 40)], &[(3_950_000, 40)]],
         shared: Some([0, 1]),
     },
     Case {
-        name: "a microsecond more than that",
+        name: "files 0.05 s and a microsecond apart",
         files: &[&[(0, 40)], &[(3_950_001, 40)]],
         shared: None,
     },
@@ -80,7 +80,7 @@ pub const CASES: &[Case] = &[
         shared: Some([0, 1]),
     },
     Case {
-        name: "a file with an orbit between the orbits of another one",
+        name: "a file with an orbit between the orbits of another file",
         files: &[
             &[(0, 40), (20_000_000_000, 40)],
             &[(10_000_000_000, 40), (30_000_000_000, 40)],
@@ -88,7 +88,7 @@ pub const CASES: &[Case] = &[
         shared: None,
     },
     Case {
-        name: "the same, and one orbit in both",
+        name: "a file with an orbit between the orbits of another file, and one orbit in both",
         files: &[
             &[(0, 40), (20_000_000_000, 40)],
             &[(10_000_000_000, 40), (20_001_000_000, 40)],
@@ -96,32 +96,32 @@ pub const CASES: &[Case] = &[
         shared: Some([0, 1]),
     },
     Case {
-        name: "a frame that the other file misses",
+        name: "a frame missing from the other file",
         files: &[&[(0, 20), (4_000_000, 20)], &[(2_000_000, 20)]],
         shared: None,
     },
     Case {
-        name: "shots of a frame that have no return in the other file",
+        name: "shots of a frame without a return in the other file",
         files: &[&[(0, 5), (1_000_000, 10)], &[(600_000, 3)]],
         shared: Some([0, 1]),
     },
     Case {
-        name: "the shot with which a profile begins after a pause",
+        name: "the first shot of a profile after a pause",
         files: &[&[(0, 20), (400_000_000, 20)], &[(400_000_000, 1)]],
         shared: Some([0, 1]),
     },
     Case {
-        name: "the shot before that",
+        name: "the shot before the first shot after a pause",
         files: &[&[(0, 20), (400_000_000, 20)], &[(399_900_000, 1)]],
         shared: None,
     },
     Case {
-        name: "the first and the third file",
+        name: "an overlap of the first and the third file",
         files: &[&[(0, 40)], &[(4_000_000, 40)], &[(3_900_000, 1)]],
         shared: Some([0, 2]),
     },
     Case {
-        name: "a file behind one that is earlier",
+        name: "an overlap with an earlier file between",
         files: &[&[(100_000_000, 40)], &[(0, 40)], &[(103_900_000, 40)]],
         shared: Some([0, 2]),
     },

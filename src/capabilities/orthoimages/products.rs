@@ -22,8 +22,8 @@ const SITES: &str = "a site with orthoimages";
 
 pub(super) static ORTHOIMAGE: Declaration = Declaration {
     path: "images/<image>/orthoimage.tif",
-    what: "orthoimage on the equirectangular map of surface.tif: brightness 1 to 255 (pixel value 0 is stored as 1); 0 in empty \
-           cells: no height, ground hidden by relief, or missing pixels; a cloud-optimised GeoTIFF",
+    what: "orthoimage on the equirectangular map of surface.tif (cloud-optimised GeoTIFF): brightness 1 to 255 (pixel value 0 is \
+           stored as 1), or 0 in cells without a height, hidden by relief, or with missing pixels",
     readers: "GIS",
     rows: "cells with a brightness",
     role: Role::Data,
@@ -41,8 +41,8 @@ pub(super) static ORTHOIMAGE: Declaration = Declaration {
 
 pub(super) static SIGMAS: Declaration = Declaration {
     path: "images/<image>/orthoimage_sigma.tif",
-    what: "standard deviation of horizontal positions (both axes together) in the orthoimage without the shared error, metres, on the cells of \
-           surface.tif: from height errors, jitter and drift; orthoimages.json states the shared error",
+    what: "standard deviation of horizontal positions in the orthoimage (both axes together, without the shared error), metres, \
+           on the cells of surface.tif: due to height errors, jitter and drift; orthoimages.json states the shared error",
     readers: "GIS",
     rows: "cells that the image shows",
     role: Role::Data,
@@ -143,14 +143,14 @@ struct Entry<'a> {
     /// Edge of a cell.
     #[schemars(extend("exclusiveMinimum" = 0))]
     cell_m: f64,
-    /// Edge of a pixel of the image on the ground.
+    /// Edge of an image pixel on the ground.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pixel_m: f64,
     rows: usize,
     columns: usize,
     /// Number of cells with a brightness.
     filled: u32,
-    /// Number of cells on the terrain model whose pixels are missing.
+    /// Number of terrain cells with missing pixels.
     without_pixels: u32,
     /// Number of terrain cells inside the image, including interpolated holes.
     terrain_cells: u32,
@@ -158,14 +158,15 @@ struct Entry<'a> {
     hidden: u32,
     /// Number of terrain cells shown with an interpolated height.
     interpolated: u32,
-    /// Root mean square of the standard deviations of the horizontal position without the shared error, both axes together.
+    /// Root mean square standard deviation of horizontal positions, both axes together, without the shared error.
     #[schemars(range(min = 0.0))]
     sigma_m: f64,
-    /// Standard deviation due to jitter, both axes together, from the scatter of tie points; omitted where
-    /// none was measured.
+    /// Standard deviation due to jitter, both axes together, from the scatter of tie points; omitted if
+    /// no scatter was measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     jitter_m: Option<f64>,
-    /// Standard deviation due to drift, both axes together: errors of the orientation that change along the image; omitted without an adjustment.
+    /// Standard deviation due to drift (orientation errors that change along the image), both axes together; omitted without
+    /// an adjustment.
     #[serde(skip_serializing_if = "Option::is_none")]
     drift_m: Option<f64>,
     /// Standard deviations of the shared error, east and north; omitted without an adjustment with heights.

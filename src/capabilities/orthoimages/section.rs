@@ -35,11 +35,12 @@ fn write(site: &SiteProducts) -> Result<Markup> {
     Ok(html! {
         (table(site, orthoimages))
         p {
-            "Cells in wide holes of the terrain model, on ground that relief hides from the camera, or with missing pixels are \
-             empty. Heights in narrow holes are interpolated; off nadir their σ is larger. σ is the standard deviation of the \
-             horizontal position of a cell, both axes together, without the shared error. Its parts are height errors, jitter (where \
-             the scatter of tie points shows it), and drift (errors of the orientation that change along the image). The adjustment \
-             states the σ of the shared error on each axis. Images without tie points are not rectified in an adjusted site."
+            "Cells are empty in wide holes of the terrain model, on ground that relief hides from the camera, and where \
+             pixels are missing. Heights in narrow holes are interpolated; off nadir their σ is larger. σ is the standard \
+             deviation of the horizontal position of a cell, both axes together, without the shared error. It contains \
+             height errors, jitter (where the scatter of tie points shows it), and drift (orientation errors that change \
+             along the image). The adjustment states the σ of the shared error on each axis. Images without tie points are \
+             not rectified in an adjusted site."
         }
         div.pieces { @for of in orthoimages { (picture(site, &of.account)?) } }
     })

@@ -16,43 +16,43 @@ use crate::{
 const DEFINITIONS: [(&str, &str); 7] = [
     (
         "cells",
-        "common: cells that both images show by their orientation; filled: those with a height; unfilled: the others by reason: flat \
-         (no texture), missing (lines or pixels), edge (of an image), unlike (no correlation), ambiguous (two heights correlate), \
-         unsettled, one_way (other heights with the other image as the template), uncertain, alone (contradicted by cells around it)",
+        "common: cells that both images show according to their orientation; filled: cells with a height; unfilled: cells \
+         without a height, by reason: flat (no texture), missing (lines or pixels), edge (of an image), unlike (no correlation), \
+         ambiguous (two heights correlate), unsettled, one_way (different heights with the other image as the template), \
+         uncertain, alone (contradicted by surrounding cells)",
     ),
     (
         "sigma_m",
-        "root mean square of the standard deviations in surface_sigma.tif, of one cell against the others: from its \
-         match, jitter_m and smoothing_m",
+        "root mean square of the standard deviations in surface_sigma.tif (one cell relative to the others): from match \
+         residuals, jitter_m and smoothing_m",
     ),
     (
         "jitter_m",
-        "standard deviation from jitter of the images against each other: the scatter of their shifts across the \
-         parallax, where no height moves them, without the scatter of the matches",
+        "standard deviation due to relative jitter of the images: scatter of their shifts across the parallax, which \
+         heights do not affect, without the scatter of the matches",
     ),
     (
         "smoothing_m",
-        "standard deviation of the height of a place against the mean of the compared square, from the relief of the \
-        model over two \
-         and four squares",
+        "standard deviation of the height of a point relative to the mean of the compared square, from the relief of the \
+         model over two and four squares",
     ),
     (
         "common_sigma_m",
-        "standard deviation of the offset common to all heights, from the adjustment of the images; missing where not \
+        "standard deviation of the offset common to all heights, from the adjustment of the images; omitted if not \
          determined",
     ),
     (
         "mola_minus_surface",
-        "radius of a footprint minus the radius of the model at its place, between the four nearest cells, metres; \
-         all: of profiles at nadir, because attitude errors change the heights of the others, or of all profiles where fewer \
-         than 10 shots at nadir lie on the model; attitude_sigma_m is the standard deviation of this change (0 at nadir), for \
-         all its largest; \
-         spread_sigmas is its robust spread about the median in its standard deviations: of the height, the shot, the \
-         profile, and of the slope times the uncertainty of the position",
+        "radius of a footprint minus the model radius at its position, interpolated between the four nearest cells, metres; \
+         all: profiles at nadir, because attitude errors change the heights of other profiles, or all profiles if fewer than \
+         10 shots at nadir lie on the model; attitude_sigma_m: standard deviation of this change (0 at nadir), for all \
+         profiles the largest; \
+         spread_sigmas: robust spread of the difference about its median, in units of its standard deviation, which contains \
+         height, shot, profile, and slope times position uncertainty",
     ),
     (
         "mola_takes_part",
-        "whether {altimeter} controlled heights of the adjustment: then its mean difference is not an independent test, but the \
+        "whether {altimeter} controlled heights in the adjustment: then the mean difference is not an independent test, but the \
          spread about it is",
     ),
 ];
@@ -60,7 +60,8 @@ const DEFINITIONS: [(&str, &str); 7] = [
 #[derive(Serialize, JsonSchema)]
 #[schemars(
     title = "Terrain model of a site",
-    description = "surface.json of areograph: how surface.tif was made of a pair of images, statistics of its cells, and the altimeter's shots against it. Metres and degrees; unknown values are omitted."
+    description = "surface.json of areograph: derivation of surface.tif from a pair of images, statistics of its cells, and \
+         differences between altimeter and model. Metres and degrees; unknown values are omitted."
 )]
 pub(super) struct Document<'a> {
     #[schemars(extend("const" = "areograph surface 1"))]
@@ -86,19 +87,19 @@ struct Definition {
 
 #[derive(Serialize, JsonSchema)]
 struct Matching {
-    /// Edge of the samples of the ground on which images were compared.
+    /// Edge of the samples of the ground at which the images were compared.
     #[schemars(extend("exclusiveMinimum" = 0))]
     sample_m: f64,
     /// Edge of the square that was compared for one height.
     #[schemars(extend("exclusiveMinimum" = 0))]
     compared_m: f64,
-    /// Angle between the rays of both images in the middle.
+    /// Angle between the rays of both images in the middle of the common ground.
     convergence_deg: f64,
-    /// Metres of height for a pixel of parallax, of the coarser image.
+    /// Height difference that corresponds to one pixel of parallax in the coarser image.
     height_of_pixel_m: f64,
     /// Median correlation.
     correlation: f64,
-    /// Median distance of the images across the parallax on the ground: the residual of their orientations.
+    /// Median distance between the images on the ground, across the parallax: the residual of their orientations.
     across_parallax_m: f64,
 }
 
@@ -116,7 +117,7 @@ struct Cells {
 
 #[derive(Serialize, JsonSchema)]
 struct Heights {
-    /// The sphere that they refer to.
+    /// Radius of the sphere to which the heights refer.
     sphere_m: f64,
     #[schemars(range(min = 0.0))]
     sigma_m: f64,

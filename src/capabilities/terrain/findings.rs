@@ -89,7 +89,7 @@ fn checks(limits: &LimitsConfig, surface: &SurfaceAccount, altimeter: &str) -> V
     } else {
         vec![Check::without_number(
             CheckKind::SurfaceHeight,
-            "too few shots on it",
+            "too few shots on the model",
             Warning,
         )]
     };
@@ -106,7 +106,7 @@ fn invalid_because(
     if surface.is_refused {
         return vec![format!(
             "terrain model: {filled} of {searched} searched cells matched, too few to be significant, so that the \
-             model is withheld; check that the pixels belong to these images, and check their orientation"
+             model is withheld; check that the pixels belong to these images, and check the image orientation"
         )];
     }
     let mut reasons = Vec::new();
@@ -125,7 +125,7 @@ fn invalid_because(
     let height_max_m = height_max_m(limits, surface);
     if !(shots.above_m.median.abs() <= height_max_m) {
         reasons.push(format!(
-            "terrain model: {altimeter} lies {} m above it (median of {} shots), expected at most {height_max_m:.1} m",
+            "terrain model: {altimeter} lies {} m above the model (median of {} shots), expected at most {height_max_m:.1} m",
             signed(shots.above_m.median, 1),
             shots.above_m.n
         ));
@@ -133,7 +133,7 @@ fn invalid_because(
     let spread_max = limits.surface_spread_max_sigma;
     if !(shots.spread_sigmas <= spread_max) {
         reasons.push(format!(
-            "terrain model: {altimeter} scatters about it by {:.1} standard deviations, expected at most {spread_max:.1}",
+            "terrain model: {altimeter} scatters about the model by {:.1} standard deviations, expected at most {spread_max:.1}",
             shots.spread_sigmas
         ));
     }
@@ -149,12 +149,12 @@ fn remark(surface: &SurfaceAccount, altimeter: &str) -> Option<String> {
     if !has_shots(surface) {
         let n = shots.above_m.n;
         return Some(format!(
-            "terrain model: {n} of {altimeter}'s shots lie on it, too few to validate its heights"
+            "terrain model: {n} shots of {altimeter} lie on the model, too few to validate its heights"
         ));
     }
     (shots.attitude_sigma_m > 0.0).then(|| {
         format!(
-            "terrain model: fewer than {SHOTS_MIN} shots at nadir lie on it; the other profiles test its heights to \
+            "terrain model: fewer than {SHOTS_MIN} shots at nadir lie on the model; the other profiles test its heights to \
              ±{:.0} m, because attitude errors shift them",
             shots.attitude_sigma_m
         )

@@ -17,8 +17,8 @@ use crate::{
 
 pub(super) static HEIGHTS: Declaration = Declaration {
     path: "surface.tif",
-    what: "terrain model of a pair of images: heights above the sphere of the body's maps, metres, on an equirectangular map; \
-           -32768 in cells without a height; a cloud-optimised GeoTIFF",
+    what: "terrain model from a pair of images (cloud-optimised GeoTIFF): heights above the sphere of the body's maps, \
+           metres, on an equirectangular map; -32768 in cells without a height",
     readers: "GIS, Ames Stereo Pipeline, `areograph pedr match`",
     rows: "cells with a height",
     role: Role::Data,
@@ -36,8 +36,8 @@ pub(super) static HEIGHTS: Declaration = Declaration {
 
 pub(super) static SIGMAS: Declaration = Declaration {
     path: "surface_sigma.tif",
-    what: "standard deviations of these heights about the offset common to all, metres, in the same cells: from the \
-           match, jitter and relief inside the compared square; surface.json has the standard deviation of the offset",
+    what: "standard deviations of the heights in surface.tif about their common offset, metres, in the same cells: due to match, \
+           jitter and relief inside the compared square; surface.json states the standard deviation of the offset",
     readers: "GIS, Ames Stereo Pipeline",
     rows: "cells with a height",
     role: Role::Data,
@@ -55,9 +55,9 @@ pub(super) static SIGMAS: Declaration = Declaration {
 
 pub(super) static DOCUMENT: Declaration = Declaration {
     path: "surface.json",
-    what: "how the terrain model was made, statistics of its cells, and its differences from {altimeter}, profile by profile",
+    what: "derivation of the terrain model, statistics of its cells, and differences from {altimeter} by profile",
     readers: "scripts",
-    rows: "profiles on it",
+    rows: "profiles on the model",
     role: Role::Metadata,
     content: Content::Document(|| DocumentSchema::of::<Document>("surface")),
     write: Write::Where {

@@ -57,7 +57,7 @@ fn write(site: &SiteProducts, account: &SurfaceAccount) -> Result<Markup> {
 /// Making of the model, and outcomes of its cells.
 fn made(site: &SiteProducts, account: &SurfaceAccount) -> Markup {
     let mut table = Table::new(
-        "Terrain model of a pair of images",
+        "Terrain model from a pair of images",
         &[
             Column::Text("images"),
             Column::Number("cell (m)"),
@@ -105,9 +105,9 @@ fn made(site: &SiteProducts, account: &SurfaceAccount) -> Markup {
         (table.finish())
         @if !reasons.is_empty() { p { "Cells without a height: " (reasons) "." } }
         p {
-            "σ of a cell: of one height against the others, from the residuals of its match, from jitter of the images \
-             (the scatter of their shifts across the parallax, where no height moves them), and from the relief inside the \
-             compared square. Errors that all heights share are stated separately (σ, common, from the adjustment). \
+            "σ of a cell is the standard deviation of one height relative to the others. It contains the residuals of the match, \
+             jitter of the images (the scatter of their shifts across the parallax, which heights do not affect), and relief \
+             inside the compared square. Errors that all heights share are stated separately (σ, common, from the adjustment). \
              Neighbouring heights within the compared square are correlated."
         }
     }
@@ -125,7 +125,7 @@ fn compared(account: &SurfaceAccount, altimeter: &str) -> Markup {
     } = &account.shots;
     if profiles.is_empty() {
         return paragraph(&format!(
-            "No footprint of {altimeter} lies on the model, so that its heights have no independent test."
+            "No footprint of {altimeter} lies on the model, so its heights have no independent test."
         ));
     }
     let mut single = shots_table(&format!(
@@ -162,14 +162,14 @@ fn compared(account: &SurfaceAccount, altimeter: &str) -> Markup {
     );
     let words = if account.shots_take_part {
         format!(
-            "{altimeter} controlled heights of the adjustment: the mean shows how well that control was met; the scatter \
-             about it is an independent test."
+            "{altimeter} controlled heights in the adjustment: the mean shows the agreement with this control; the scatter \
+             about the mean is an independent test."
         )
     } else {
-        format!("{altimeter} did not control the heights: an independent test.")
+        format!("{altimeter} did not control the heights: the comparison is an independent test.")
     };
     let spread = format!(
-        "Expected about the median: {} m (σ of height, shot, profile, and of their places on its slopes); found: {} of it.",
+        "Expected spread about the median: {} m (σ of height, shot, profile, and position on slopes); ratio found: {}.",
         label(*sigma_m, 1),
         label(*spread_sigmas, 2)
     );

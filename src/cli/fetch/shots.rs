@@ -17,15 +17,11 @@ use crate::{
 #[derive(Debug, thiserror::Error, Cause)]
 #[cause(Configuration)]
 enum Unclear {
-    #[error(
-        "shots.files is {0}; expected a path or glob with at most one `*`, in the name of the file"
-    )]
-    #[cause(
-        "write the folder in full and a glob for one table of each window, such as \"shots/*.csv\""
-    )]
+    #[error("shots.files is {0}; expected a path or glob with at most one `*`, in the file name")]
+    #[cause("write the full folder and a glob for one table per window, such as \"shots/*.csv\"")]
     Glob(String),
     #[error("shots.files is {path}; the windows need {}", needed.join(", "))]
-    #[cause("write a glob for one table of each window, such as \"shots/*.csv\", or these names")]
+    #[cause("write a glob for one table per window, such as \"shots/*.csv\", or these names")]
     Names { path: String, needed: Vec<String> },
 }
 
@@ -53,7 +49,7 @@ pub(super) fn wishes(
         if globs.iter().any(|glob| glob.is_absent) {
             let note = |window: &String| {
                 format!(
-                    "window {window}: its box is not known before its image; no table of shots is asked for it"
+                    "window {window}: the box is not known before the image; no table of shots is queried"
                 )
             };
             notes.extend(without_box.iter().map(note));

@@ -21,7 +21,7 @@ const DAY_S: f64 = 86_400.0;
 #[derive(Debug, thiserror::Error, Cause)]
 #[cause(Configuration)]
 enum Unclear {
-    #[error("pedr.files is {0}; expected a pattern whose folder has no wildcard")]
+    #[error("pedr.files is {0}; expected a pattern whose folder contains no wildcard")]
     #[cause("write the folder of the PEDR files in full, such as \"../pedr/*.b\"")]
     PedrFolder(String),
 }
@@ -149,9 +149,12 @@ impl Wanted {
                 absent.retain(|path| !table.files.contains(path));
             }
         }
-        let others = absent
-            .iter()
-            .map(|path| format!("{}: no archive has it; provide it", path.display()));
+        let others = absent.iter().map(|path| {
+            format!(
+                "{}: no archive contains this file; provide it yourself",
+                path.display()
+            )
+        });
         self.notes.extend(others);
         Ok(())
     }
@@ -223,7 +226,7 @@ impl Wanted {
                 },
             }),
             None => self.notes.push(format!(
-                "image {}: its identifier names no product of the index; its times and files are not known",
+                "image {}: the identifier matches no product of the index; times and files are not known",
                 image.id
             )),
         }

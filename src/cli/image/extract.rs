@@ -56,7 +56,7 @@ struct NoLines;
 /// A radiometric correction of a file whose label does not state gain and offset.
 #[derive(Debug, thiserror::Error, Cause)]
 #[error("--calibrate requires an image file of the archive, whose label states gain and offset")]
-#[cause(Configuration: "give the .imq or .img file, or leave out --calibrate")]
+#[cause(Configuration: "give the .imq or .img file, or omit --calibrate")]
 struct NotOfTheArchive;
 
 /// Margin beyond the range of the pixels for the correction of odd and even samples, DN.
@@ -126,7 +126,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
     }
     if complaints > 0 {
         tracing::warn!(
-            "{complaints} complaints of {}; `areograph image info` lists them",
+            "{complaints} complaints about {}; `areograph image info` lists them",
             arguments.file.display()
         );
     }
@@ -171,7 +171,8 @@ fn notes(image: &PixelFile, calibration: Option<&Calibration>) -> Vec<(&'static 
         notes.push((
             "Description",
             format!(
-                "radiance in DN/ms at gain 1{zero} = {:e} + {:e} * value; {:.3} DN added to odd samples, subtracted from even ones",
+                "radiance in DN/ms at gain 1{zero} = {:e} + {:e} * value; {:.3} DN added to odd samples and subtracted from \
+                 even samples",
                 calibration.least, calibration.step, calibration.odd_even_dn
             ),
         ));
@@ -230,7 +231,7 @@ impl Calibration {
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "clamped to 16 bits just before"
+        reason = "clamped to the range of 16 bits before"
     )]
     fn value(&self, sample: usize, pixel: u8) -> u16 {
         let sign = if sample.is_multiple_of(2) { 1.0 } else { -1.0 };

@@ -144,7 +144,7 @@ fn described(cube: &OrientedCube) -> Value {
         "oriented": true,
         "orientation": match &cube.orientation {
             Orientation::Tables => "tables of spiceinit".to_owned(),
-            Orientation::State { model, plugin } => format!("state of a camera model by csminit: {model}, {plugin}"),
+            Orientation::State { model, plugin } => format!("camera model state from csminit: {model}, {plugin}"),
         },
         "instrument": support.instrument.id,
         "product_id": support.identifier,

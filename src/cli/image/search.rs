@@ -68,7 +68,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
     let undecided = pairs.iter().filter(|pair| !pair.is_known_apart).count();
     if undecided > 0 {
         tracing::warn!(
-            "{undecided} pairs may be of one orbit: the index has neither orbits nor times of both images"
+            "{undecided} pairs may be from one orbit: the index states neither orbits nor times of both images"
         );
     }
     match arguments.format {
@@ -147,13 +147,13 @@ pub(in crate::cli) fn propose(
 fn tell_index(path: &Path, index: &ImageIndex) {
     if !index.has_label {
         tracing::warn!(
-            "{}: no .lbl beside it; its columns are assumed to be those of the mapping mission",
+            "{}: no .lbl file beside this index; the columns of the mapping mission are assumed",
             path.display()
         );
     }
     if let Some(row) = index.bad_rows.first() {
         tracing::warn!(
-            "{}: {} rows are left out, the first in line {}: {}",
+            "{}: {} rows are skipped, the first in line {}: {}",
             path.display(),
             index.bad_rows.len(),
             row.line,
@@ -195,7 +195,7 @@ fn found_in(
         );
     }
     for (left_out, what) in [
-        (of_no_camera, "are of an unknown camera; left out"),
+        (of_no_camera, "are from an unknown camera and are omitted"),
         (
             without_place,
             "could not be tested: no centre, or neither corners nor size on the ground",

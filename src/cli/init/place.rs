@@ -50,16 +50,16 @@ impl PlaceArguments {
 #[derive(Debug, thiserror::Error, Cause)]
 enum NoPlace {
     #[error("unknown place {name:?}; expected {known}")]
-    #[cause(Configuration: "name one of them, or give the edges of the window by --box")]
+    #[cause(Configuration: "name one of these, or give the window edges with --box")]
     Name { name: String, known: String },
     #[error("the table of places is malformed: {0}")]
     #[cause(Bug: "report this")]
     Table(String),
-    #[error("no copy of the index of images")]
-    #[cause(Input: "run `areograph fetch --into DIR --index` first, or name cumindex.tab by --index")]
+    #[error("no copy of the image index")]
+    #[cause(Input: "run `areograph fetch --into DIR --index` first, or name cumindex.tab with --index")]
     Index,
-    #[error("no image of the index shows ground of the window")]
-    #[cause(Input: "give a larger window by --box")]
+    #[error("no image in the index shows ground inside the window")]
+    #[cause(Input: "give a larger window with --box")]
     Images,
 }
 

@@ -51,7 +51,7 @@ fn season(text: &str) -> Result<[f64; 2], String> {
         .and_then(|(first, last)| Some([edge(first)?, edge(last)?]));
     edges
         .filter(|edges: &[f64; 2]| edges.iter().all(|edge| (0.0..=360.0).contains(edge)))
-        .ok_or_else(|| "expected two longitudes of 0 to 360 degrees, such as 330,30".to_owned())
+        .ok_or_else(|| "expected two longitudes from 0 to 360 degrees, such as 330,30".to_owned())
 }
 
 /// The radius of a shot that is that of the ground.

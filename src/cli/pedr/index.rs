@@ -34,7 +34,9 @@ pub(super) struct Arguments {
 
 /// A file that changed without a trace in the file system.
 #[derive(Debug, thiserror::Error, Cause)]
-#[error("its content differs from the index, although size and times match: hash {was}, now {is}")]
+#[error(
+    "the content differs from the index, although size and times match: hash was {was}, is {is}"
+)]
 #[cause(Input: "fetch the file again: the disk may be failing; the index now describes the present content")]
 struct Altered {
     was: String,
@@ -85,7 +87,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     let encoded = index.encode().ok_or(NotEncoded).in_file(&path)?;
     atomic::replace(&path, &encoded, INDEX_MARK)?;
     output::line(format_args!(
-        "{}: {files} files of {bytes} bytes, {read} of them read now, {gone} removed; {} bytes",
+        "{}: {files} files of {bytes} bytes, {read} of them read now, {gone} removed; index of {} bytes",
         path.display(),
         encoded.len()
     ));

@@ -48,7 +48,7 @@ pub(super) struct Arguments {
     /// Maximum number of shots in a segment.
     #[arg(long, default_value_t = 15, value_parser = clap::value_parser!(u16).range(3..=1_000))]
     segment_points: u16,
-    /// Variance of heights that a segment must exceed, square metres.
+    /// Height variance that a segment must exceed, square metres.
     #[arg(long, value_name = "M2", default_value_t = 1_000.0, value_parser = above_zero)]
     least_variance: f64,
     /// Similarity of heights; auto uses pearson while the model is offset by more than a tenth of the relief, or 100
@@ -91,7 +91,7 @@ enum Measure {
 /// One image is given.
 #[derive(Debug, thiserror::Error, Cause)]
 #[error("--isd names the images {0:?}; expected two or more with distinct names")]
-#[cause(Configuration: "give --isd NAME=FILE for every image that the model was made from, or for none")]
+#[cause(Configuration: "give --isd NAME=FILE for every image from which the model was made, or for none")]
 struct Images(Vec<String>);
 
 fn image(text: &str) -> Result<(String, PathBuf), String> {

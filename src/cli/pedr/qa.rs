@@ -41,7 +41,7 @@ pub(super) struct Arguments {
     /// Threads; the default is one for every processor.
     #[arg(long)]
     threads: Option<std::num::NonZeroU16>,
-    /// Do not report the archive as invalid if the kernels have no position for some of its shots.
+    /// Do not report the archive as invalid if the kernels contain no position for some of its shots.
     #[arg(long)]
     allow_uncovered: bool,
     #[command(flatten)]
@@ -51,7 +51,7 @@ pub(super) struct Arguments {
 /// An implausible clock bias.
 #[derive(Debug, thiserror::Error, Cause)]
 #[error("--clock-bias-s is {0}; expected -10 to 10")]
-#[cause(Configuration: "give the seconds by which time tags are late, 0.117 for MOLA")]
+#[cause(Configuration: "give the delay of the time tags in seconds, 0.117 for MOLA")]
 struct ClockBias(f64);
 
 impl Arguments {

@@ -97,8 +97,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
     let complaints: u64 = answer.complaint_counts.values().sum();
     if complaints > 0 {
         tracing::warn!(
-            "{complaints} complaints: bad records are left out; `complaints` of the answer counts them by reason, \
-             `first_complaints` has the first {COMPLAINTS_MAX}"
+            "{complaints} complaints: invalid records are skipped; `complaints` of the answer counts them by reason, \
+             `first_complaints` lists the first {COMPLAINTS_MAX}"
         );
     }
     answer.end()

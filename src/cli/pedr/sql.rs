@@ -105,7 +105,7 @@ fn tell(tally: &Tally) {
     });
     let each: Vec<String> = each.collect();
     tracing::warn!(
-        "records with errors, whose invalid shots are omitted: {}; pedr info lists them",
+        "records with errors, whose invalid shots are omitted: {}; `areograph pedr info` lists them",
         each.join(", ")
     );
 }

@@ -73,15 +73,15 @@ enum Program {
 /// A file that pedr2tab does not accept.
 #[derive(Debug, thiserror::Error, Cause)]
 #[error("the label does not begin with CCSD3ZF0")]
-#[cause(Input: "name a PEDR file, or a list of them whose name has no .b; the marker is not required in a list or with \
+#[cause(Input: "name a PEDR file, or a list file without .b in its name; the marker is not required in a list or with \
     --per-shot")]
 struct NoMarker;
 
 /// Two files whose tables have the same name.
 #[derive(Debug, thiserror::Error, Cause)]
-#[error("would be the table of {} and of {}; expected a table for each", .0.display(), .1.display())]
-#[cause(Configuration: "name each file once; print files of one name into different folders (--out), or all into one \
-    table (T before its name in the preferences)")]
+#[error("would be the table of {} and of {}; expected one table per file", .0.display(), .1.display())]
+#[cause(Configuration: "name each file once; write files with the same name into different folders (--out), or all files \
+    into one table (T before its name in the preferences)")]
 struct OneName(PathBuf, PathBuf);
 
 /// Default preferences file.

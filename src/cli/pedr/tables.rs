@@ -29,10 +29,10 @@ enum Misplaced {
     #[cause("search tables and PEDR files separately")]
     Mixed,
     #[error(
-        "a table of the Orbital Data Explorer, which has no positions of the spacecraft; expected PEDR files"
+        "a table of the Orbital Data Explorer, which contains no spacecraft positions; expected PEDR files"
     )]
     #[cause(
-        "name the table in [[shots]] of a site, with layout = \"ode_pedr\" and kernels: its range check compares them"
+        "name the table in [[shots]] of a site, with layout = \"ode_pedr\" and kernels: the range check compares both"
     )]
     NotPedr,
 }
@@ -94,8 +94,8 @@ pub(super) fn described(table: &SearchedTable) -> Value {
 pub(super) fn state_nadir_by_range(answer: &mut Value) {
     answer["nadir_by_range"] = true.into();
     answer["range_minus_distance_m"] = Value::Null;
-    answer["remark"] = "a table has no position of the spacecraft: the position is taken on the radius through the \
-        footprint, at the range, so that a comparison of range and distance does not apply"
+    answer["remark"] = "a table contains no spacecraft position: the position is assumed on the radius through the \
+        footprint, at the range, so a comparison of range and distance does not apply"
         .into();
 }
 
@@ -196,6 +196,6 @@ mod tests {
         assert_eq!(answer["nadir_by_range"], true);
         assert!(answer["range_minus_distance_m"].is_null());
         let remark = answer["remark"].as_str().unwrap();
-        assert!(remark.contains("no position of the spacecraft"), "{remark}");
+        assert!(remark.contains("no spacecraft position"), "{remark}");
     }
 }

@@ -21,17 +21,17 @@ pub fn comparison_schema() -> DocumentSchema {
 #[derive(Serialize, JsonSchema)]
 #[schemars(
     title = "Comparison of rival kernel sets",
-    description = "Answer of `areograph kernels compare --json`: how far the orbit and the attitude of each set are \
-                   from the mean of all. Members end in their unit; unknown values are omitted."
+    description = "Answer of `areograph kernels compare --json`: differences of the orbit and the attitude of each set from \
+                   the mean of all sets. Member names end in the unit; unknown values are omitted."
 )]
 pub struct Answer<'a> {
     #[schemars(extend("const" = "areograph kernel comparison 1"))]
     format: &'static str,
     rule: &'static str,
-    /// Positions of MGS from Mars against the mean of all sets, along the axes of the mean orbit.
+    /// Positions of MGS relative to Mars minus the mean of all sets, along the axes of the mean orbit.
     orbit: Table<'a, OrbitSet<'a>, OrbitDifference<'a>>,
-    /// Attitudes against their mean, as turns about the same axes; on the ground along the boresight, at the epochs
-    /// where it meets Mars.
+    /// Attitudes relative to their mean, as rotations about the same axes; ground distances along the boresight, at epochs
+    /// where the boresight meets Mars.
     #[serde(skip_serializing_if = "Option::is_none")]
     attitude: Option<Attitude<'a>>,
     start_utc: &'a str,

@@ -34,7 +34,7 @@ pub(super) fn turn_epochs(
     let positions: Vec<Intervals> = held.iter().map(|coverage| coverage.spk.clone()).collect();
     let epochs = equally_spaced(&common.intersection(&held_by_all(&positions)));
     if epochs.is_empty() {
-        notes.push("attitudes are not compared: the sets have none in common".to_owned());
+        notes.push("attitudes are not compared: the sets have no attitudes in common".to_owned());
     }
     (epochs, gaps)
 }

@@ -40,7 +40,7 @@ pub(super) fn lines(uncovered: &[Uncovered]) -> Vec<String> {
             ));
         }
         let told = told.join(", ");
-        format!("left out of the comparison: {set} has no {what} for {total_s:.3} s: {told}")
+        format!("omitted from the comparison: {set} has no {what} for {total_s:.3} s: {told}")
     });
     lines.collect()
 }
@@ -66,7 +66,7 @@ mod tests {
         let told = lines(&uncovered);
         assert_eq!(told.len(), 2);
         assert!(
-            told[0].starts_with("left out of the comparison: nav has no position for 20.000 s: from 0 .. to 0 UTC (0.500 s), ")
+            told[0].starts_with("omitted from the comparison: nav has no position for 20.000 s: from 0 .. to 0 UTC (0.500 s), ")
                 && told[0].contains("from 4 ..")
                 && !told[0].contains("from 5 ..")
                 && told[0].contains(", and 35 more, "),

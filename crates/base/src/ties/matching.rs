@@ -17,22 +17,22 @@ pub enum Unmatched {
     #[error("lines are missing or damaged")]
     Missing,
     /// A template or its search area extends over an edge.
-    #[error("too near to the edge of an image")]
+    #[error("too close to the edge of an image")]
     Edge,
     /// Nothing within the margin is similar.
     #[error("no correlation within the margin")]
     Unlike,
     /// The match is ambiguous.
-    #[error("another place correlates nearly as well")]
+    #[error("another position correlates nearly as well")]
     Ambiguous,
     /// Least squares diverges, or does not end.
     #[error("least squares does not converge")]
     Unsettled,
     /// The search from the other image fails, or leads to another point.
-    #[error("not the same place when searched from the other image")]
+    #[error("the search from the other image finds a different position")]
     OneWay,
     /// Found, but with insufficient accuracy.
-    #[error("its standard deviation is too large")]
+    #[error("the standard deviation is too large")]
     Uncertain,
     /// A cell of a terrain model that contradicts most neighbouring cells.
     #[error("most neighbouring cells have different heights")]

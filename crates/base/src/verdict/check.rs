@@ -27,23 +27,23 @@ pub enum CheckOutcome {
     Pass,
 }
 
-/// A check of a site: of many profiles, images or pairs, the one that uses most of the limit.
+/// A check of a site; of several profiles, images or pairs, the one that uses the largest share of the limit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 pub struct Check {
     /// The checked quantity.
     pub kind: CheckKind,
-    /// Its name in the words of the site.
+    /// Name of the quantity in the terms of the site.
     #[serde(default)]
     pub what: String,
     /// The outcome.
     pub outcome: CheckOutcome,
     /// The profile, image or pair; empty for the whole site.
     pub subject: String,
-    /// The value, in `unit`; `None` if it is not finite.
+    /// Value in `unit`; absent if not finite.
     #[serde(default, skip_serializing_if = "crate::stored::is_left_out")]
     pub value: Option<f64>,
-    /// The largest permitted magnitude; for counts with a lower limit, the least.
+    /// Largest permitted magnitude; for checks with a lower limit, the smallest permitted value.
     #[serde(default, skip_serializing_if = "crate::stored::is_left_out")]
     pub limit: Option<f64>,
     /// Unit of both.

@@ -4,13 +4,13 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Kind of a check: independent data first, then data that entered the result, then the agreement of images with each
-/// other.
+/// Kind of a check: independent data first, then data used in the result, then the mutual agreement of
+/// images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum CheckKind {
-    /// A contradiction without a number: described in the reasons.
+    /// A contradiction without a value, which the reasons describe.
     Contradiction,
     /// Footprints in the windows.
     Footprints,
@@ -18,132 +18,132 @@ pub enum CheckKind {
     AdjustmentMade,
     /// Median height of tie points above the MOLA surface, with the orientation from the kernels.
     HeightBefore,
-    /// Mean difference of the surfaces of two profiles, in standard deviations.
+    /// Mean difference between the surfaces of two profiles, in standard deviations.
     ProfilesApart,
     /// Mean of range minus distance of a profile, without outliers.
     RangeMean,
-    /// Mean distance between the spacecraft positions of the PEDR file and of the kernels.
+    /// Mean distance between the spacecraft positions in the PEDR file and in the kernels.
     OrbitsApart,
-    /// Mean of range minus distance to the spacecraft position of the PEDR file itself.
+    /// Mean of range minus distance to the spacecraft position in the PEDR file.
     Decoding,
     /// Share of outliers among the ranges of a profile.
     RangeOutliers,
-    /// Shots of the longest profile.
+    /// Number of shots in the longest profile.
     Shots,
-    /// Clock correction of least spread minus the configured one.
+    /// Clock correction with the smallest spread of ranges minus the configured correction.
     ClockCorrection,
-    /// Footprints of simultaneous shots in an image, of those that the mountings of camera and laser place in it.
+    /// Number of simultaneous footprints inside an image, among those expected from the mountings of camera and laser.
     FootprintsInside,
-    /// Distance between the spacecraft of support data and of the altimeter's file.
+    /// Distance between the spacecraft positions in support data and in the altimeter file.
     SupportPosition,
-    /// Angle along the track between the beam in the altimeter's file and its mounting by the attitude of the images.
+    /// Along-track angle between the beam in the altimeter file and its mounting according to the image attitudes.
     BeamAlong,
-    /// The same across the track.
+    /// Across-track angle between the beam in the altimeter file and its mounting according to the image attitudes.
     BeamAcross,
-    /// Epochs of an image at which its boresight meets the body.
+    /// Number of epochs of an image at which the boresight meets the body.
     BoresightMeets,
-    /// Median height of tie points above the MOLA surface, adjusted: MOLA is part of a default adjustment.
+    /// Median height of adjusted tie points above the MOLA surface, which a default adjustment uses.
     HeightAfter,
-    /// Share of tie points that lie farther from the MOLA surface than 3.29 of their standard deviations, or were
-    /// rejected for it.
+    /// Share of tie points that lie more than 3.29 standard deviations from the MOLA surface, or were rejected for
+    /// this reason.
     HeightOutliers,
     /// Standard deviation of the mean height of the adjusted tie points.
     HeightSigma,
-    /// Share of the common ground with heights in a terrain model.
+    /// Share of the common ground for which a terrain model has heights.
     SurfaceFilled,
-    /// Median height of the altimeter's shots above a terrain model.
+    /// Median height of the altimeter shots above a terrain model.
     SurfaceHeight,
-    /// Robust spread of the shots about a terrain model, in their standard deviations.
+    /// Robust spread of the altimeter shots about a terrain model, in standard deviations.
     SurfaceSpread,
-    /// Images with a tie point in the adjustment.
+    /// Number of images with a tie point in the adjustment.
     ImagesJoined,
-    /// Pairs of images whose tie points were used in the adjustment.
+    /// Number of image pairs with tie points in the adjustment.
     PairsJoined,
-    /// Distance along the flight between two images at their tie points, adjusted.
+    /// Along-track parallax of two images at their tie points, adjusted orientation.
     ParallaxAfter,
-    /// The same with the orientation from the kernels.
+    /// Along-track parallax of two images at their tie points, orientation from the kernels.
     ParallaxBefore,
     /// Standard deviation of unit weight of tie points along the track.
     TieResidualsAlong,
-    /// The same across the track.
+    /// Standard deviation of unit weight of tie points across the track.
     TieResidualsAcross,
-    /// Standard deviation of unit weight of the other kinds of observation, the one that exceeds most of what chance
-    /// explains.
+    /// Standard deviation of unit weight of another kind of observation, the largest relative to the limit that
+    /// chance explains.
     VarianceComponents,
     /// Share of the tie points not used in the adjustment.
     TiesRejected,
-    /// Tie points used in the adjustment.
+    /// Number of tie points used in the adjustment.
     TiesUsed,
-    /// Largest correction of an image, in a priori standard deviations.
+    /// Largest orientation correction of an image, in a priori standard deviations.
     Correction,
-    /// Boresight of the laser or position of a profile, by the images of a common bus, in standard deviations.
+    /// Largest standardised correction of an unknown of laser, profiles or line times on a common bus.
     Boresight,
-    /// Time by which the attitude of an image is extrapolated beyond the permitted time: a sentence among the
-    /// reasons.
+    /// Extrapolation of the attitude of an image beyond the permitted time, which the reasons state in a
+    /// sentence.
     Attitude,
     /// RMSE of the second-order polynomials of position.
     PositionRmse,
-    /// RMSE of the second-order rotation vector.
+    /// RMSE of the second-order polynomials of the rotation vector.
     PointingRmse,
-    /// Error of the camera tables between their nodes.
+    /// Interpolation error of the camera tables between their nodes.
     TableError,
-    /// Records that could not be read.
+    /// Number of skipped records.
     SkippedRecords,
-    /// Error in plan of laser control withheld from a calibration, over the expected error.
+    /// Plan error of laser control withheld from a calibration, divided by the expected error.
     HeldBackPlane,
-    /// The same in height.
+    /// Height error of laser control withheld from a calibration, divided by the expected error.
     HeldBackHeight,
-    /// Error in plan of laser control used by a calibration, over the expected error.
+    /// Plan error of laser control used in a calibration, divided by the expected error.
     ControlPlane,
-    /// The same in height.
+    /// Height error of laser control used in a calibration, divided by the expected error.
     ControlHeight,
-    /// Degradation of the control of an orbit that was not used in a calibration, in standard deviations.
+    /// Degradation of the control of an orbit not used in a calibration, in standard deviations.
     OtherOrbits,
-    /// Standard deviation of a tie point in plan after a calibration, over the a priori one.
+    /// Plan standard deviation of a tie point after a calibration; the limit is the a priori standard deviation.
     PlaceKnown,
-    /// The same in height.
+    /// Height standard deviation of a tie point after a calibration; the limit is the a priori standard deviation.
     HeightKnown,
-    /// Root mean square of the residuals of tie points between the lines of a camera.
+    /// Root mean square residual of tie points between the lines of a camera.
     LinesAgree,
-    /// Shift of the image of a camera by a calibration.
+    /// Shift of the image of a camera due to a calibration.
     CameraMoved,
-    /// Share of the tie points that a calibration left out.
+    /// Share of the tie points that a calibration rejected.
     TiesLeftOut,
-    /// Share of its control.
+    /// Share of the control that a calibration rejected.
     ControlLeftOut,
-    /// Median shift of the units of the last round of a calibration.
+    /// Median shift of the units in the last round of a calibration.
     RoundShift,
-    /// Change of the residuals of control in that round.
+    /// Change of the control residuals in the last round of a calibration.
     RoundControl,
-    /// Laser shots withheld from a match: root mean square of model minus laser, bias removed.
+    /// Root mean square of model minus laser at shots withheld from a match, bias removed.
     HeldOutShots,
-    /// Units of laser shots that were matched and kept.
+    /// Number of units of laser shots that were matched and kept.
     UnitsKept,
     /// Share of the matching units that agree with each other.
     UnitsAgree,
-    /// Terrain model above the laser.
+    /// Median height of the terrain model above the laser.
     ModelBias,
-    /// Redundant equations of a net, by which its measurements test each other.
+    /// Number of redundant equations of a net.
     Redundancy,
-    /// Share of the measurements of a net that were left out as blunders.
+    /// Share of the measurements of a net that were rejected as blunders.
     MeasurementsRemoved,
     /// Share of used measurements beyond 3.5 robust standard deviations.
     MeasurementsFlagged,
-    /// Controls of a net that were kept.
+    /// Number of controls of a net that were kept.
     ControlsKept,
-    /// Controls of a net that were left out.
+    /// Number of controls of a net that were rejected.
     ControlsRefused,
-    /// Differences of bricks at their seams.
+    /// Misfit of bricks at their seams.
     Seams,
-    /// Scale of a picture by the controls against its stated scale.
+    /// Relative difference between the scale of a picture from the controls and its stated scale.
     PictureScale,
-    /// Stretch of the controls of a net against its pictures.
+    /// Stretch of the controls of a net relative to the pictures.
     ControlStretch,
-    /// Mean offset of the control of an orbit that was not used in a calibration, in standard deviations of one point.
+    /// Mean offset of the control of an orbit not used in a calibration, in standard deviations of one point.
     OtherOrbitsOffset,
-    /// Share of withheld stretches of profiles beyond the interval that contains 99.7 % of them as stated.
+    /// Share of withheld profile stretches outside their stated 99.7 % interval.
     WithheldStretches,
-    /// Share of the pulses of a profile that have no shot.
+    /// Share of missing shots among the pulses of a profile.
     ShotsMissing,
 }
 
@@ -166,16 +166,16 @@ impl CheckKind {
             Self::PairsJoined => "Pairs joined by tie points",
             Self::HeightSigma => "Uncertainty of the mean height",
             Self::RangeMean => "Range − distance (mean)",
-            Self::OrbitsApart => "Orbit of the {shot_source} against kernels",
-            Self::Decoding => "Range − distance, orbit of the {shot_source}",
+            Self::OrbitsApart => "Orbit in the {shot_source} against kernels",
+            Self::Decoding => "Range − distance, orbit in the {shot_source}",
             Self::RangeOutliers => "Outliers among ranges",
             Self::Shots => "Shots in the longest profile",
             Self::ShotsMissing => "Missing shots of a profile",
             Self::ClockCorrection => "Clock correction, best − configured",
             Self::FootprintsInside => "Simultaneous footprints in the image",
             Self::SupportPosition => "Position in support data against the {shot_source}",
-            Self::BeamAlong => "Laser beam by the attitude, along track",
-            Self::BeamAcross => "Laser beam by the attitude, across track",
+            Self::BeamAlong => "Laser beam against its mounting, along track",
+            Self::BeamAcross => "Laser beam against its mounting, across track",
             Self::BoresightMeets => "Boresight meets the body (epochs)",
             Self::ParallaxAfter => "Along-track parallax, adjusted",
             Self::ParallaxBefore => "Along-track parallax, before",
@@ -191,28 +191,28 @@ impl CheckKind {
             Self::PointingRmse => "Pointing model, RMSE",
             Self::TableError => "Camera table, interpolation error",
             Self::SkippedRecords => "Records skipped",
-            Self::HeldBackPlane => "Withheld control, error in plan",
-            Self::HeldBackHeight => "Withheld control, error in height",
-            Self::ControlPlane => "Control used, error in plan",
-            Self::ControlHeight => "Control used, error in height",
+            Self::HeldBackPlane => "Withheld control, plan error",
+            Self::HeldBackHeight => "Withheld control, height error",
+            Self::ControlPlane => "Control used, plan error",
+            Self::ControlHeight => "Control used, height error",
             Self::OtherOrbits => "Control of other orbits, degradation",
             Self::PlaceKnown => "Tie point uncertainty in plan",
             Self::HeightKnown => "Tie point uncertainty in height",
             Self::LinesAgree => "Tie points between lines",
-            Self::CameraMoved => "Image moved by the calibration",
-            Self::TiesLeftOut => "Tie points left out",
-            Self::ControlLeftOut => "Control left out",
-            Self::RoundShift => "Units shifted in the last round (median)",
-            Self::RoundControl => "Control, change in the last round",
+            Self::CameraMoved => "Image shift due to the calibration",
+            Self::TiesLeftOut => "Tie points rejected by the calibration",
+            Self::ControlLeftOut => "Control rejected by the calibration",
+            Self::RoundShift => "Unit shift in the last round (median)",
+            Self::RoundControl => "Control residuals, change in the last round",
             Self::HeldOutShots => "Withheld shots, model − laser",
             Self::UnitsKept => "Units kept",
             Self::UnitsAgree => "Matching units that agree",
             Self::ModelBias => "Model above the laser (median)",
             Self::Redundancy => "Redundancy",
-            Self::MeasurementsRemoved => "Measurements left out as blunders",
+            Self::MeasurementsRemoved => "Measurements rejected as blunders",
             Self::MeasurementsFlagged => "Measurements beyond 3.5 robust σ",
             Self::ControlsKept => "Controls kept",
-            Self::ControlsRefused => "Controls left out",
+            Self::ControlsRefused => "Controls rejected",
             Self::Seams => "Misfit of bricks at their seams",
             Self::PictureScale => "Scale of a picture against metres_per_unit",
             Self::ControlStretch => "Stretch of the controls",

@@ -9,20 +9,21 @@ use crate::{
 };
 
 declare_table! {
-    /// Archive files, as `areograph fetch` retrieves them: copies of the indexes, and the files that sites name and
-    /// that are missing. Files with different content are never replaced. Failures are alerts; the night continues.
+    /// Retrieval of archive files, as with `areograph fetch`: copies of the indexes, and missing files that sites name.
+    /// Files with different content are never replaced. Failures cause alerts, and the night continues.
     pub struct FetchConfig {
         /// Whether every night begins with the retrieval of archive files.
         nightly: bool = key(yes_or_no("", "")).or(false),
-        /// Folder for `fetch.json` and the copies of the indexes; created if missing. Site files state where their files lie.
+        /// Folder for `fetch.json` and the copies of the indexes; created if missing. Site files state the locations of
+        /// data files.
         folder: PathBuf = key(text()).or("fetch".to_owned()).then(|path, keys: &mut Keys<'_, '_>| keys.review().resolve(&path)),
-        /// Folder for the latest leap seconds of NAIF's generic kernels; without it they are not fetched.
+        /// Folder for the latest leap-second kernel of NAIF; without this key, the kernel is not fetched.
         generic_kernels: Option<PathBuf> = key(text()).unused(r#""kernels/generic""#).then(|path, keys: &mut Keys<'_, '_>| {
             path.map(|path| keys.review().resolve(&path))
         }),
         /// Table with other hosts or layouts, in the form of `config/archives/mgs.toml`.
         archives: Option<PathBuf> = key(FILE).unused(r#""archives.toml""#),
-        /// Longest time for the indexes, and for the files of one site.
+        /// Longest time for retrieval of the indexes, and of the files of one site.
         limit_s: f64 = key(from_to(1.0, 604_800.0)).or(14_400.0),
     }
 }

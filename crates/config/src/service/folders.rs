@@ -26,7 +26,7 @@ pub(super) fn outputs_apart(service: &ServiceConfig, keys: &mut Keys<'_, '_>) {
             };
             let (output, input) = (output.display(), input.display());
             let expected = format!(
-                "folders of inputs and outputs apart from each other: {input} (inputs.{input_name}) and {output} \
+                "separate folders for inputs and outputs: {input} (inputs.{input_name}) and {output} \
                  (outputs.{name}) overlap"
             );
             // A default is not in the file.

@@ -26,7 +26,7 @@ pub fn checksums(table: &[u8]) -> Result<Checksums, FetchError> {
         let Some((md5, path)) = parts else {
             return Err(wrong(
                 line,
-                format!("{row:?}; expected 32 hexadecimal digits, two blanks and a path"),
+                format!("{row:?}; expected 32 hexadecimal digits, two spaces and a path"),
             ));
         };
         if !is_path(path) {

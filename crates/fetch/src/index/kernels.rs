@@ -50,7 +50,9 @@ pub fn kernel_rows(table: &[u8], label: &[u8]) -> Result<Vec<KernelRow>, FetchEr
     let columns = of_label(&label);
     for needed in NEEDED {
         if !columns.iter().any(|column| column.name == needed) {
-            return Err(of_label_at(format!("the label has no column {needed}")));
+            return Err(of_label_at(format!(
+                "the label does not define the column {needed}"
+            )));
         }
     }
     let stated = |key: &str| {
@@ -84,7 +86,9 @@ pub fn kernel_rows(table: &[u8], label: &[u8]) -> Result<Vec<KernelRow>, FetchEr
         (0, _) => Err(of_label_at("the table is empty".to_owned())),
         (found, Some(expected)) if found != expected => Err(FetchError::Index {
             line: found,
-            problem: format!("the last of {found} rows; expected {expected}, as the label states"),
+            problem: format!(
+                "the last of {found} rows; expected {expected} rows, as the label states"
+            ),
         }),
         _ => Ok(rows),
     }
@@ -124,7 +128,7 @@ fn of_row(row: &[u8], columns: &[Column], line: usize) -> Result<KernelRow, Stri
     };
     if span.is_none() && ["SPK", "CK"].contains(&&*kind) {
         return Err(format!(
-            "an index row of type {kind} without START_TIME and STOP_TIME"
+            "the index row of type {kind} has no START_TIME and STOP_TIME"
         ));
     }
     Ok(KernelRow {

@@ -32,7 +32,7 @@ pub(crate) fn plan_generic(into: &Path, listed: &[Vec<Listed>], archive: &Generi
                 shot_box: None,
             }),
             None => plan.lacks.push(format!(
-                "generic kernels: the listing of {folder} has no {start}*{end}"
+                "generic kernels: the listing of {folder} contains no {start}*{end}"
             )),
         }
     }

@@ -25,7 +25,7 @@ pub(crate) fn find_images(
             product.is_some() && product_named(&image.product_id) == product
         };
         let Some(image) = images.find(of_product) else {
-            let lack = format!("image {}: not in the index of images", wish.product);
+            let lack = format!("image {}: not in the image index", wish.product);
             plan.lacks.push(lack);
             continue;
         };
@@ -35,7 +35,7 @@ pub(crate) fn find_images(
                 what: format!("image {}", image.product_id),
             }),
             None => plan.lacks.push(format!(
-                "image {}: the index has no start time; its kernels are unknown",
+                "image {}: the index states no start time; the kernels for the image are unknown",
                 image.product_id
             )),
         }
@@ -46,7 +46,7 @@ pub(crate) fn find_images(
             format!("{}/{}", image.volume, image.file.trim_start_matches('/')).to_ascii_lowercase();
         if image.volume.is_empty() || !is_path(&below) {
             let lack = format!(
-                "image {}: the index has no usable path ({below:?})",
+                "image {}: the index states no usable path ({below:?})",
                 image.product_id
             );
             plan.lacks.push(lack);

@@ -96,11 +96,11 @@ impl Planner<'_> {
                     plan.files.push(self.file(row, path.clone(), why));
                 }
                 None => plan.lacks.push(format!(
-                    "kernel {name}: not in the index of the archive, by this name{}",
+                    "kernel {name}: not in the index of the archive, under this name{}",
                     if of_archive == name {
                         ""
                     } else {
-                        " or its own"
+                        " or its name in the archive"
                     }
                 )),
             }
@@ -140,7 +140,7 @@ impl Planner<'_> {
                     .files
                     .push(self.placed(row, "pinned by the site".to_owned())),
                 None => plan.lacks.push(format!(
-                    "kernel {pinned}: pinned by the site, and not in the index of the archive"
+                    "kernel {pinned}: pinned by the site, but not in the index of the archive"
                 )),
             }
         }
@@ -162,12 +162,12 @@ impl Planner<'_> {
         let planets: Vec<&KernelRow> = spk().filter(|row| !is_own(row)).collect();
         if planets.is_empty() {
             plan.notes.push(
-                "the index has no planetary ephemeris: unless the orbits contain Mars and the Sun, put one into the folder of \
-                 kernels (de*.bsp, and mar*.bsp where orbits are relative to the barycentre of Mars)"
+                "the index has no planetary ephemeris: unless the orbit kernels contain Mars and the Sun, put one into the \
+                 kernel folder (de*.bsp, and mar*.bsp where orbits are relative to the barycentre of Mars)"
                     .to_owned(),
             );
         } else {
-            let what = "planets, from when the light of the Sun left";
+            let what = "planets, from the departure of the sunlight";
             plan.add(self.covering(planets.into_iter(), spans, [with_sun; 2], what));
         }
         plan

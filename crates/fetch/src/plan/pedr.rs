@@ -21,7 +21,7 @@ pub(crate) fn plan_pedr(
         .collect();
     files.sort_by_key(|(orbit, ..)| *orbit);
     if files.is_empty() {
-        let lack = "pedr: no listing of the archive has a laser file".to_owned();
+        let lack = "pedr: no listing of the archive contains a laser file".to_owned();
         plan.lacks.push(lack);
         return plan;
     }
@@ -36,7 +36,7 @@ pub(crate) fn plan_pedr(
                 wanted.push((orbits, why));
             }
             None => plan.notes.push(format!(
-                "{}: {} is outside of the time of the laser, {} to {}",
+                "{}: {} is outside the time span of the laser data, {} to {}",
                 span.what,
                 span.utc[0],
                 archive.orbits.first().map_or("?", |(_, utc)| utc),
@@ -71,7 +71,7 @@ pub(crate) fn plan_pedr(
     }
     for ((_, reason), _) in wanted.iter().zip(is_met).filter(|(_, met)| !met) {
         plan.lacks
-            .push(format!("pedr: no file of the archive has {reason}"));
+            .push(format!("pedr: no file of the archive contains {reason}"));
     }
     plan
 }
@@ -145,7 +145,7 @@ mod tests {
         };
         let plan = plan_pedr(Path::new("p"), &[], &[span], &listed, &archive);
         assert!(
-            plan.files.is_empty() && plan.notes[0].contains("outside of the time of the laser")
+            plan.files.is_empty() && plan.notes[0].contains("outside the time span of the laser")
         );
     }
 }

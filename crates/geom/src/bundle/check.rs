@@ -97,14 +97,14 @@ fn check_bus<M>(network: &Network<M>, bus: &CommonBus) -> Result<(), BundleError
     }
     for (index, profile) in bus.profiles.iter().enumerate() {
         for sigma_m in &profile.sigma_m {
-            let what = "standard deviation of its position";
+            let what = "standard deviation of the position";
             deviation(Part::Profile(index), what, *sigma_m)?;
         }
         if let Some(shared) = &profile.shared {
             let part = Part::Profile(index);
             matched(network, part, 0, shared.image)?;
             for by_rotation_m in &shared.by_rotation_m {
-                finite(part, "offset by the rotation of its image", *by_rotation_m)?;
+                finite(part, "offset due to image rotation", *by_rotation_m)?;
             }
         }
     }

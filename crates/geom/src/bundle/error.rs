@@ -43,7 +43,9 @@ pub enum BundleError {
         unknowns: usize,
     },
     /// The steps do not converge.
-    #[error("did not converge after {steps} steps; weighted sum of squares {weighted_squares:.6e}")]
+    #[error(
+        "the adjustment did not converge after {steps} steps; weighted sum of squares {weighted_squares:.6e}"
+    )]
     NotConverged {
         /// Steps taken.
         steps: usize,

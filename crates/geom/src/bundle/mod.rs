@@ -297,10 +297,10 @@ pub enum PointRejection {
     #[error("too few rays to determine the point")]
     Undetermined,
     /// It lies behind a camera that has measured it.
-    #[error("behind a camera that measured it")]
+    #[error("behind the camera of one of its images")]
     BehindCamera,
     /// No line of a camera that has measured it sees it.
-    #[error("not in the plane of any line of a camera that measured it")]
+    #[error("not in the plane of any line of one of its images")]
     Unseen,
 }
 

@@ -23,7 +23,7 @@ pub struct ReliefOfSite {
 pub struct ProfileShift {
     /// Index of the profile.
     pub profile: usize,
-    /// Towards east, north and up, metres.
+    /// Offset in east, north and height, metres.
     pub shift_m: [f64; 3],
     /// Square roots of the cofactors of these, metres.
     pub root_cofactors_m: [f64; 3],

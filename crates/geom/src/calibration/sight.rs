@@ -46,10 +46,10 @@ pub struct GroundPoint {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum SightError {
     /// Its rays are parallel, or it has only one.
-    #[error("its rays do not cross")]
+    #[error("its rays do not intersect")]
     Parallel,
     /// It lies behind a camera, or its numbers are not finite.
-    #[error("its rays cross behind a camera")]
+    #[error("its rays intersect behind a camera")]
     Behind,
     /// The iteration did not converge.
     #[error("its rays do not determine a position")]

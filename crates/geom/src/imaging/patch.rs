@@ -116,7 +116,7 @@ impl Patch {
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "compared with the size of the patch"
+        reason = "the value is compared with the patch size"
     )]
     fn split(&self, axis: usize, coordinate: f64) -> Option<(usize, f64)> {
         let behind = coordinate - 0.5 - self.first[axis] as f64;

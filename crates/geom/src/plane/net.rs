@@ -42,15 +42,15 @@ pub struct Net {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum PlaneError {
     /// Fewer than two controls that a picture shows.
-    #[error("controls that a picture shows: {found}; expected two or more")]
+    #[error("controls on pictures: {found}; expected two or more")]
     TooFewControls {
         /// Number of such controls.
         found: usize,
     },
     /// A picture, and those tied to it only, can rotate, shrink or move.
     #[error(
-        "picture {picture} is tied to the net by {ties} points; expected two or more distinct points, \
-         on a part of the net that has controls"
+        "picture {picture} is tied to the net by {ties} points; expected two or more distinct points \
+         on a part of the net with controls"
     )]
     UnderconnectedPicture {
         /// The picture.
@@ -60,7 +60,7 @@ pub enum PlaneError {
         ties: usize,
     },
     /// Two points of a picture coincide.
-    #[error("points {first} and {second} have the same place in picture {picture}")]
+    #[error("points {first} and {second} have the same position in picture {picture}")]
     EqualPoints {
         /// The picture.
         picture: usize,
@@ -70,7 +70,7 @@ pub enum PlaneError {
         second: usize,
     },
     /// Two controls coincide on the map.
-    #[error("controls {first} and {second} have the same place on the map")]
+    #[error("controls {first} and {second} have the same position on the map")]
     EqualControls {
         /// One point.
         first: usize,
@@ -78,13 +78,13 @@ pub enum PlaneError {
         second: usize,
     },
     /// A picture has the opposite handedness to its neighbours.
-    #[error("picture {picture} is a mirror image of what its neighbours show")]
+    #[error("picture {picture} is a mirror image compared with its neighbours")]
     MirroredPicture {
         /// The picture.
         picture: usize,
     },
     /// All pictures have the opposite handedness to the map.
-    #[error("the figure is a mirror image of its controls")]
+    #[error("the pictures are a mirror image of the controls")]
     MirroredFigure,
 }
 

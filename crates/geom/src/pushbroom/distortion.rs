@@ -59,7 +59,7 @@ struct CurvePoint {
 /// A line of which two samples have one look direction, or one looks back.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error(
-    "pixel {pixel:.1} of the detector does not look farther across the track than its neighbour nearer to the boresight"
+    "pixel {pixel:.1} of the detector does not point farther across the track than the next pixel towards the boresight"
 )]
 pub struct FoldedLine {
     /// Pixel, from the outer edge of the first one.

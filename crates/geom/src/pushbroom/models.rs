@@ -11,7 +11,7 @@ use crate::{
     polynomial::Polynomial,
 };
 
-/// The forms of an image's orientation.
+/// Form of the exterior orientation of an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(rename_all = "snake_case")]

@@ -169,7 +169,7 @@ impl<'a, M: ExteriorOrientation + ?Sized> Projector<'a, M> {
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "the number is clamped to the table before, NaN becomes 0"
+        reason = "the number is clamped to the table first; NaN becomes 0"
     )]
     fn nearest(&self, x: f64) -> &Node {
         let place = (x + self.half_lines) * self.nodes_per_line + 0.5;

@@ -17,7 +17,7 @@ pub struct Limits {
 /// The line that sees a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Solution {
-    /// Lines from the middle of the header image.
+    /// Line offset from the middle of the header image, lines.
     pub x: f64,
     /// Camera vector of the point at that line, metres; its z component is positive.
     pub camera_m: Vector3<f64>,

@@ -180,7 +180,7 @@ fn crossover(
 
 #[allow(
     clippy::cast_possible_truncation,
-    reason = "a site is some hundred cells across"
+    reason = "a site is a few hundred cells across"
 )]
 fn cell(place_m: &Vector2<f64>) -> [i64; 2] {
     [place_m.x, place_m.y].map(|component_m| (component_m / CELL_M).floor() as i64)

@@ -38,7 +38,7 @@ pub struct LeftOut {
     pub others: Vec<usize>,
     /// Crossovers with them.
     pub crossovers: usize,
-    /// Its height above theirs, metres.
+    /// Height of the profile above the others, metres.
     pub above_m: f64,
     /// Standard deviation of this height, metres.
     pub sigma_m: f64,

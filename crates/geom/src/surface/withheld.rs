@@ -35,19 +35,19 @@ pub struct Withheld {
     pub shots: usize,
     /// Mean of measured minus predicted heights, metres.
     pub above_m: f64,
-    /// Standard deviation of that as the surface states it, metres.
+    /// Standard deviation of this mean according to the surface, metres.
     pub sigma_m: f64,
-    /// Distance of the nearest shot of another profile, metres.
+    /// Distance to the nearest shot of another profile, metres.
     pub nearest_m: f64,
 }
 
-/// How well stated standard deviations predict withheld stretches.
+/// Agreement of withheld stretches with the stated standard deviations.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 pub struct WithheldScore {
     /// Stretches.
     pub stretches: usize,
-    /// Shares of them inside the intervals that state 68.27, 95 and 99.7 %.
+    /// Shares of the stretches inside the stated intervals of 68.27, 95 and 99.7 %.
     pub inside: [f64; 3],
     /// Mean log-likelihood of a stretch; for a normal distribution −½ z² − ln σ.
     pub log_likelihood: f64,
@@ -55,7 +55,7 @@ pub struct WithheldScore {
     pub log_sigma: f64,
     /// Root mean square of the errors, metres.
     pub rms_m: f64,
-    /// Median of the error without its sign, in standard deviations; 0.67 for a normal distribution.
+    /// Median absolute error, in standard deviations; 0.67 for a normal distribution.
     pub median_sigmas: f64,
 }
 

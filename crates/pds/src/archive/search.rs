@@ -32,9 +32,9 @@ pub const UNUSABLE_SHARE_MAX: f64 = 0.01;
 /// A file with more than isolated damaged records.
 #[derive(Debug, thiserror::Error, Cause)]
 #[error(
-    "{unusable} of {records} records cannot be used; expected at most {UNUSABLE_MAX} and one in a hundred. The first: {first}"
+    "{unusable} of {records} records are unusable; expected at most {UNUSABLE_MAX} plus 1 % of the records. The first: {first}"
 )]
-#[cause(Input: "the file was damaged in transfer: fetch it again, or leave it out")]
+#[cause(Input: "the file was damaged in transfer: fetch it again, or omit it")]
 struct Damaged {
     unusable: u64,
     records: u64,

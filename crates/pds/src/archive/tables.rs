@@ -50,7 +50,7 @@ pub fn repetition_complaint(line: u32, earlier: &str, earlier_line: u32) -> RowC
     RowComplaint {
         line,
         text: format!(
-            "the shot of {earlier} line {earlier_line} with other values; expected the same values, or another time"
+            "same shot as in {earlier} line {earlier_line}, but different values; expected the same values, or a different time"
         ),
     }
 }

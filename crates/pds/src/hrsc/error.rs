@@ -6,11 +6,11 @@ use areograph_base::error::Cause;
 #[derive(Debug, thiserror::Error, Cause)]
 #[cause(Input)]
 pub(crate) enum HrscError {
-    #[error("the file holds a label only; expected the rows of the image after it")]
-    #[cause("give the file of the archive (.IMG), with its rows")]
+    #[error("the file contains only a label; expected image rows after the label")]
+    #[cause("give the archive file (.IMG), which contains the rows")]
     NoRows,
     #[error("the label has no {key}; expected {expected}")]
-    #[cause("give a level-2 file of the archive (h…2.IMG) as it was delivered")]
+    #[cause("give a level-2 archive file (h…2.IMG) as delivered")]
     Lacking {
         key: &'static str,
         expected: &'static str,
@@ -23,12 +23,13 @@ pub(crate) enum HrscError {
         expected: String,
     },
     #[error(
-        "the file has {found} bytes; expected {expected}, as FILE_RECORDS and RECORD_BYTES of its label state"
+        "the file has {found} bytes; expected {expected}, according to FILE_RECORDS and RECORD_BYTES in its label"
     )]
-    #[cause("fetch the file again: it is truncated, extended, or differs from the archive")]
+    #[cause("fetch the file again: it is truncated or extended, or differs from the archive file")]
     Size { found: u64, expected: u64 },
     #[error(
-        "{lines} rows of {row_bytes} bytes from byte {start} on end at byte {end}; expected the end of the file, {bytes}"
+        "{lines} rows of {row_bytes} bytes, beginning at byte {start}, end at byte {end}; expected the end of the file, \
+         byte {bytes}"
     )]
     #[cause(like = Size)]
     Rows {
@@ -38,8 +39,8 @@ pub(crate) enum HrscError {
         end: u64,
         bytes: u64,
     },
-    #[error("{key} of the VICAR label is {vicar}; expected {expected}, as the PDS label states")]
-    #[cause("fetch the file again: its labels belong to two images, or one of them was edited")]
+    #[error("{key} in the VICAR label is {vicar}; expected {expected}, the value in the PDS label")]
+    #[cause("fetch the file again: its labels belong to two images, or one label was edited")]
     Vicar {
         key: &'static str,
         vicar: u64,
@@ -47,18 +48,18 @@ pub(crate) enum HrscError {
     },
     #[error("SAMPLE_TYPE is {stated:?}, but {because}; expected samples in the stated byte order")]
     #[cause(
-        "fetch the file again: its samples were swapped after the label was written, or its label was edited"
+        "fetch the file again: the bytes of its samples were swapped after the label was written, or the label was edited"
     )]
     ByteOrder { stated: String, because: String },
     #[error(
-        "{known} of {lines} rows have a time and an exposure in their prefixes; expected all of them, or nearly all"
+        "{known} of {lines} rows have a time and an exposure in their prefixes; expected all or nearly all rows"
     )]
     #[cause(
-        "fetch the file again; or give the pieces of its line times as images.exposures, and its label without rows"
+        "fetch the file again, or give the pieces of the line times in images.exposures, and the label without rows"
     )]
     NoTimes { known: usize, lines: usize },
     #[error(
-        "rows {first} to {last} have no time in their prefixes, and adjacent rows do not determine it"
+        "rows {first} to {last} have no times in their prefixes, and adjacent rows do not determine the times"
     )]
     #[cause(like = NoTimes)]
     TimeGap { first: usize, last: usize },

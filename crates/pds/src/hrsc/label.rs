@@ -37,7 +37,7 @@ pub(super) fn image_label(label: &Label, cameras: &[Instrument]) -> Result<Image
     if let Some(entry) = either(label, DETECTOR[0], DETECTOR[1])?
         && entry.value.eq_ignore_ascii_case(FRAME_CAMERA)
     {
-        let expected = "one of the nine lines; the frame camera (SRC) is not supported";
+        let expected = "one of the nine detector lines; the frame camera (SRC) is not supported";
         return Err(other_image(&entry.key, &entry.value, expected));
     }
     let instrument = camera(label, cameras, DETECTOR)?;
@@ -140,7 +140,7 @@ mod tests {
             (
                 "_S2",
                 "_SRC",
-                "DETECTOR_ID is \"MEX_HRSC_SRC\"; expected one of the nine lines",
+                "DETECTOR_ID is \"MEX_HRSC_SRC\"; expected one of the nine detector lines",
             ),
             (
                 "_S2",

@@ -64,7 +64,7 @@ pub(super) fn of_one_product(label: &Label, file_name: &str) -> Result<(), Label
         return contradicts(&entry.key, &entry.value);
     }
     if names_another(file_name) {
-        return contradicts("the name of the file", file_name);
+        return contradicts("the file name", file_name);
     }
     let is_other = |entry: &&Entry| {
         let detector = |(_, id): &&(&str, &str)| id.eq_ignore_ascii_case(&entry.value);
@@ -114,7 +114,7 @@ mod tests {
         );
         assert!(
             refused(product, "h5271_0000_ir2.img")
-                .contains("the name of the file is \"h5271_0000_ir2.img\"")
+                .contains("the file name is \"h5271_0000_ir2.img\"")
         );
         let label = parse(format!("{product}DETECTOR_ID = MEX_HRSC_IR\n").as_bytes()).unwrap();
         for file in ["h5270_0000_ir2.img", "nadir.img"] {

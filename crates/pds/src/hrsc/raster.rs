@@ -99,7 +99,7 @@ impl Raster {
                 label,
                 "LINE_SAMPLES",
                 [1, SAMPLES_MAX],
-                "the samples of a line",
+                "the number of samples per line",
             )?),
             number,
             is_lsb,
@@ -109,7 +109,7 @@ impl Raster {
                 key: "RECORD_BYTES",
                 value: record_bytes.to_string(),
                 expected: format!(
-                    "{}, {} bytes of prefix and {} samples",
+                    "{} ({} bytes of prefix and {} samples)",
                     raster.row_bytes(),
                     raster.prefix_bytes,
                     raster.samples
@@ -210,7 +210,7 @@ impl Raster {
             }
             _ => (stated.rough > ROUGHER * other.rough).then(|| {
                 let times = stated.rough / other.rough.max(f64::MIN_POSITIVE);
-                format!("adjacent samples differ {times:.0} times less in the other byte order")
+                format!("differences of adjacent samples are {times:.0} times smaller in the other byte order")
             }),
         };
         match because {
@@ -270,7 +270,7 @@ fn number(label: &Label) -> std::result::Result<(Number, bool), HrscError> {
     let bits = whole(label, "SAMPLE_BITS", [8, 16], "8 or 16")?;
     let entry = of_rows(label, "SAMPLE_TYPE").ok_or(HrscError::Lacking {
         key: "SAMPLE_TYPE",
-        expected: "that of samples with 8 or 16 bits",
+        expected: "the type of samples with 8 or 16 bits",
     })?;
     match (bits, &*entry.value.to_ascii_uppercase()) {
         (8, "UNSIGNED_INTEGER" | "MSB_UNSIGNED_INTEGER" | "LSB_UNSIGNED_INTEGER") => {

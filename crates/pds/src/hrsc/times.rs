@@ -138,7 +138,7 @@ impl Rows {
                 }
             }
             self.damaged.push(format!(
-                "lines {first} to {}: no times in their prefixes; their times follow from the adjacent lines",
+                "lines {first} to {}: no times in their prefixes; times from the adjacent lines are used",
                 row - 1
             ));
         }
@@ -182,7 +182,7 @@ impl Rows {
         } else {
             let pause_s = step_s - period_s;
             self.lacking.push(format!(
-                "before line {next}: a gap of {pause_s:.4} s, {:.1} lines that are not in the file",
+                "before line {next}: a gap of {pause_s:.4} s ({:.1} missing lines)",
                 pause_s / period_s
             ));
             return Ok(true);
@@ -220,7 +220,7 @@ impl Rows {
     fn time_is(&mut self, row: usize, start_s: f64) {
         let apart_s = self.start_s[row] - start_s;
         self.damaged.push(format!(
-            "line {row}: the time in its prefix differs by {apart_s:.6} s from the adjacent lines, whose time is used"
+            "line {row}: the time in its prefix differs by {apart_s:.6} s from the time from the adjacent lines, which is used"
         ));
         self.start_s[row] = start_s;
     }
@@ -272,7 +272,7 @@ impl Rows {
         let told = kinds.flat_map(|mut remarks| {
             let more = remarks.len().saturating_sub(REMARKS_MAX);
             remarks.truncate(REMARKS_MAX);
-            let more = (more > 0).then(|| format!("and {more} more lines of this kind"));
+            let more = (more > 0).then(|| format!("and {more} more remarks of this kind"));
             remarks.into_iter().chain(more)
         });
         told.collect()
@@ -336,7 +336,7 @@ mod tests {
         assert!(apart_s(&times, &cut) < 2e-7); // seconds, rounding of ET
         assert_eq!(
             times.remarks,
-            ["before line 100: a gap of 0.0926 s, 7.0 lines that are not in the file"]
+            ["before line 100: a gap of 0.0926 s (7.0 missing lines)"]
         );
     }
 

@@ -40,7 +40,7 @@ impl<'a> Bits<'a> {
     /// A number of `count` bits, 16 at most, its least significant bit first.
     #[allow(
         clippy::cast_possible_truncation,
-        reason = "masked to at most 16 bits just before"
+        reason = "the mask leaves at most 16 bits"
     )]
     pub(super) fn number(&mut self, count: u32) -> u16 {
         let value = self.peek() & ((1 << count) - 1);

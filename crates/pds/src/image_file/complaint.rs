@@ -113,9 +113,8 @@ impl fmt::Display for Fault {
                 formatter,
                 "the label states {key} = {label}; the fragments state {fragment}"
             ),
-            Self::FragmentChecksum => {
-                formatter.write_str("the checksum byte is wrong; its lines may be wrong too")
-            }
+            Self::FragmentChecksum => formatter
+                .write_str("the checksum byte is wrong; lines of the fragment may also be wrong"),
             Self::Header { skipped } => write!(
                 formatter,
                 "no fragment header of this image; {skipped} bytes were skipped"
@@ -124,7 +123,7 @@ impl fmt::Display for Fault {
             Self::Lost { fragments } => {
                 write!(formatter, "the {fragments} preceding fragments are missing")
             }
-            Self::Repeated => formatter.write_str("this fragment is a duplicate; it is ignored"),
+            Self::Repeated => formatter.write_str("this fragment is a duplicate and is ignored"),
             Self::CutOff { lacking } => write!(
                 formatter,
                 "the file ends within the fragment; {lacking} bytes are missing"
@@ -134,21 +133,23 @@ impl fmt::Display for Fault {
             }
             Self::LostSync { next: Some(next) } => write!(
                 formatter,
-                "no uncompressed line where one is expected; the next one is at byte {next}"
+                "expected an uncompressed line here; the next one is at byte {next}"
             ),
-            Self::LostSync { next: None } => formatter.write_str(
-                "no uncompressed line where one is expected, nor later; the image ends here",
-            ),
-            Self::TooMany => formatter.write_str("more than 65536 fragments; the rest is ignored"),
+            Self::LostSync { next: None } => formatter
+                .write_str("expected an uncompressed line here or later; the image ends here"),
+            Self::TooMany => {
+                formatter.write_str("more than 65536 fragments; the others are ignored")
+            }
             Self::TooManyLines { header, possible } => write!(
                 formatter,
-                "{header} lines in the header, more than the data can hold; {possible} are used"
+                "the header states {header} lines, more than the data can contain; {possible} lines are used"
             ),
-            Self::TooLarge => {
-                formatter.write_str("more pixels than the data can hold; the fragment is ignored")
+            Self::TooLarge => formatter.write_str(
+                "the header states more pixels than the data can contain; the fragment is ignored",
+            ),
+            Self::Group => {
+                formatter.write_str("a block of an undefined group; the fragment is ignored")
             }
-            Self::Group => formatter
-                .write_str("a block of a group that does not exist; the fragment is ignored"),
             Self::Short => formatter.write_str("the data end before the last block"),
             Self::Lines { found, header } => {
                 write!(formatter, "{found} lines found; the header states {header}")

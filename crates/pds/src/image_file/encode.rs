@@ -48,7 +48,8 @@ pub struct NewImage<'a> {
 pub enum EncodeError {
     /// A size that headers cannot represent.
     #[error(
-        "{samples} samples of {pixels} pixels; expected whole lines, both multiples of 16, at most 4080 samples and 65535 × 16 lines"
+        "{pixels} pixels in lines of {samples} samples; expected whole lines, with multiples of 16 samples and of 16 lines, \
+         at most 4080 samples and 65535 × 16 lines"
     )]
     Size {
         /// Samples of a line.
@@ -58,7 +59,7 @@ pub enum EncodeError {
     },
     /// A coding that is supported for reading only.
     #[error(
-        "{0:?} can only be read; expected raw, prediction with a table from 0 to 6, or cosines"
+        "coding {0:?} is supported for reading only; expected raw, prediction with a table from 0 to 6, or cosines"
     )]
     Coding(Coding),
 }
@@ -193,7 +194,7 @@ fn mark(out: &mut BitWriter) {
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
-    reason = "fields of the header wrap, as those on board did"
+    reason = "header fields wrap, as on board"
 )]
 fn header(
     image: &NewImage<'_>,

@@ -124,7 +124,7 @@ fn words(code: &Code, step: i32) -> [Option<(u32, u32)>; 2] {
 
 #[allow(
     clippy::cast_possible_truncation,
-    reason = "steps times spacing stay within 16 bits"
+    reason = "the product of step and spacing stays within 16 bits"
 )]
 fn transformed<'a>(lines: impl Iterator<Item = &'a [u8]>, spacing: u16) -> Block {
     let mut sums = [[0.0; EDGE]; EDGE];

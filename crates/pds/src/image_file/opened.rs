@@ -30,7 +30,7 @@ use areograph_base::{
 pub enum ImageFileError {
     /// A label without an image, or of another object.
     #[error("the label describes no image in this file: {lacking} is missing")]
-    #[cause("give an .imq or .img file of the archive, label and pixels in one file")]
+    #[cause("give an .imq or .img archive file, which contains label and pixels")]
     NoImage {
         /// The missing part.
         lacking: &'static str,
@@ -48,7 +48,7 @@ pub enum ImageFileError {
     },
     /// A raster of a different kind.
     #[error("{key} is {value:?}; expected {expected}")]
-    #[cause("give an .imq or .img file of the archive, with 8 bits a pixel")]
+    #[cause("give an .imq or .img archive file with 8 bits per pixel")]
     Raster {
         /// The keyword.
         key: &'static str,

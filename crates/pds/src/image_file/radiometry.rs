@@ -75,7 +75,7 @@ enum NotCalibrated {
         expected: &'static str,
     },
     #[error(
-        "gain and offset change {changes} times within the image; the label has only the values of its first line"
+        "gain and offset change {changes} times within the image; the label states only the values of the first line"
     )]
     Changes { changes: u16 },
 }

@@ -148,7 +148,7 @@ impl Group {
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "a fraction of 16 bits, and another number of 16 bits"
+        reason = "a 16-bit fraction and a 16-bit number"
     )]
     fn mean(&self, coded: u16) -> i32 {
         let [least, largest] = self.means;
@@ -161,7 +161,7 @@ impl Group {
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
-    reason = "clamped to a byte just before"
+    reason = "clamped to the range of a byte"
 )]
 fn from_cosines(coefficients: &[i32; AREA]) -> [u8; AREA] {
     let mut rows = [[0.0; EDGE]; EDGE];
@@ -193,7 +193,7 @@ fn from_cosines(coefficients: &[i32; AREA]) -> [u8; AREA] {
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
-    reason = "clamped to a byte just before"
+    reason = "clamped to the range of a byte"
 )]
 fn from_walsh(coefficients: &[i32; AREA]) -> [u8; AREA] {
     let mut rows = [[0; EDGE]; EDGE];

@@ -54,7 +54,7 @@ impl FocalLine {
             pixel_mm.is_finite() && pixel_mm > 1.0 / PIXELS_PER_MM_MAX
         });
         let inverse = inverse.ok_or_else(|| {
-            let expected = "pixels of a plane: independent of focal2pixel_lines, at most 100000 in a millimetre";
+            let expected = "coefficients independent of focal2pixel_lines, with at most 100000 pixels per millimetre";
             document.refused("focal2pixel_samples", expected)
         })?;
         let centre = document.object("detector_center")?;
@@ -141,14 +141,14 @@ pub(super) fn camera(
         },
         pointing: PointingTime {
             ck_bias_s: 0.0,
-            source: "support file: its attitudes are those of its epochs".to_owned(),
+            source: "support file: attitudes refer to its epochs".to_owned(),
         },
     };
     match Distortion::check(&instrument) {
         Ok(()) => Ok((instrument, turn)),
         Err(folded) => Err(document.refused(
             "optical_distortion",
-            format!("coefficients that keep the samples in order; with these {folded}"),
+            format!("coefficients that keep the samples in order; with these, {folded}"),
         )),
     }
 }
@@ -221,7 +221,7 @@ fn identifier(name: &str) -> String {
 /// The distortion model, by its name in usgscsm.
 fn distortion(document: &Object<'_>, turned_rad: f64) -> Result<DistortionModel, IsdError> {
     const KEY: &str = "optical_distortion";
-    const KNOWN: &str = "one of the distortions radial, lrolrocnac; areograph supports no others";
+    const KNOWN: &str = "one of the supported distortions radial and lrolrocnac";
     let table = document.object(KEY)?;
     let [name] = table.keys()[..] else {
         return Err(document.refused(KEY, KNOWN));
@@ -238,7 +238,7 @@ fn distortion(document: &Object<'_>, turned_rad: f64) -> Result<DistortionModel,
         }
         "lrolrocnac" if turned_rad.sin().abs() > ALONG_AXIS => Err(document.refused(
             "focal2pixel_samples",
-            "samples along y, across which the distortion lrolrocnac works",
+            "samples along y, to which the distortion lrolrocnac applies",
         )),
         "lrolrocnac" => {
             let [coefficient_per_mm2] = table.object(name)?.numbers("coefficients")?;

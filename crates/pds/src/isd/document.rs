@@ -11,7 +11,7 @@ const SHOWN: usize = 60;
 
 /// Invalid support data.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, Cause)]
-#[cause(Input: "regenerate the support data with the program that made them (ALE's isd_generate), or configure the \
+#[cause(Input: "regenerate the support data with the program that wrote them (ALE's isd_generate), or configure the \
     image by label and kernels")]
 pub(crate) enum IsdError {
     #[error("not image support data: {0}; expected a JSON document of one object")]
@@ -220,7 +220,7 @@ impl<'a> Object<'a> {
 
     /// Epochs, increasing, two or more.
     pub(super) fn epochs(&self, key: &str) -> Result<Vec<f64>, IsdError> {
-        const EXPECTED: &str = "two or more increasing epochs, seconds of ET";
+        const EXPECTED: &str = "two or more increasing epochs in ET seconds";
         let found = self.find(key, EXPECTED)?;
         let entries = found.entries(EXPECTED)?;
         let epochs: Vec<f64> = entries
@@ -233,7 +233,7 @@ impl<'a> Object<'a> {
         let back = epochs.windows(2).position(|pair| pair[1] <= pair[0]);
         match back {
             Some(index) => Err(entries[index + 1].refused(format!(
-                "an epoch after {}, that of the row before",
+                "an epoch after {}, the epoch of the preceding row",
                 epochs[index]
             ))),
             None => Ok(epochs),

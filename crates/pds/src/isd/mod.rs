@@ -247,7 +247,7 @@ fn line_times(document: &Object<'_>) -> Result<LineTimes> {
         #[allow(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
-            reason = "within the lines of the image, as was just found"
+            reason = "within the lines of the image, as checked above"
         )]
         let first_line = first as u32;
         let start = Et::from_seconds(centre_s + time_s + period_s * (first - line + 0.5));
@@ -262,14 +262,14 @@ fn line_times(document: &Object<'_>) -> Result<LineTimes> {
     // Written so that NaN is rejected too.
     if !(late_s.abs() <= times.mean_period_s()) {
         let expected = format!(
-            "the time of the first line by line_scan_rate and center_ephemeris_time, {:.6}, within a line",
+            "the time of the first line computed from line_scan_rate and center_ephemeris_time, {:.6}, within one line",
             times.start().seconds()
         );
         return Err(document.refused("starting_ephemeris_time", expected).into());
     }
     if !(times.duration_s() < IMAGE_DURATION_END_S) {
         let expected = format!(
-            "less than {IMAGE_DURATION_END_S} s in all; {lines} lines take {:.1} s",
+            "less than {IMAGE_DURATION_END_S} s in total; {lines} lines take {:.1} s",
             times.duration_s()
         );
         return Err(document.refused(KEY, expected).into());

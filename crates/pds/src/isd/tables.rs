@@ -192,6 +192,6 @@ fn as_many(table: &Object<'_>, key: &str, rows: usize, epochs: usize) -> Result<
     if rows == epochs {
         return Ok(());
     }
-    let expected = format!("{epochs} rows, one for each of ephemeris_times, not {rows}");
+    let expected = format!("{epochs} rows, one per entry of ephemeris_times, not {rows}");
     Err(table.refused(key, expected))
 }

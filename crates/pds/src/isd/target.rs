@@ -9,7 +9,7 @@ pub(super) const RADIUS_TOLERANCE_M: f64 = 10.0;
 
 /// Support data of a different body.
 #[derive(Debug, thiserror::Error, Cause)]
-#[cause(Input: "leave the image out, or set body to the body of its support data; the configuration expects {body} \
+#[cause(Input: "omit the image, or set body to the body of its support data; the configuration expects {body} \
     (body = \"{}\")", body.word())]
 pub enum ForeignBody {
     /// Identified by its code.
@@ -86,7 +86,8 @@ impl SupportTables {
             return None;
         }
         Some(format!(
-            "the support data {name} rotate {body} by {:.1} m at the equator against {}; positions are in their frame",
+            "the frame of {body} in the support data {name} is rotated by {:.1} m at the equator relative to {}; positions refer \
+             to the frame of the support data",
             turn_rad * body.model().equatorial_radius_m,
             body.names().short_frame
         ))

@@ -6,11 +6,11 @@ use areograph_base::error::Cause;
 #[derive(Debug, Clone, PartialEq, thiserror::Error, Cause)]
 #[cause(Input: "run spiceinit on the cube again, or configure the image by label and kernels, or by support data (isd)")]
 pub(super) enum CubeError {
-    #[error("not an ISIS cube: expected Object = IsisCube at its start")]
+    #[error("not an ISIS cube: expected Object = IsisCube at the start of the file")]
     #[cause("name the cube in images.cube, and other labels in images.label")]
     NotACube,
-    #[error("the label has no End; expected a complete label of a cube")]
-    #[cause("fetch or make the cube again: it is truncated or damaged")]
+    #[error("the label has no End; expected a complete cube label")]
+    #[cause("fetch or regenerate the cube: it is truncated or damaged")]
     NoEnd,
     #[error(
         "the cube has no table {name}; expected InstrumentPosition, InstrumentPointing, BodyRotation and SunPosition, as spiceinit \
@@ -33,7 +33,7 @@ pub(super) enum CubeError {
     },
     #[error("group {group} of the cube: {key} is {value:?}; expected {expected}")]
     #[cause(
-        "make the cube again from the archive's image: its label is damaged, or was written by a program other than \
+        "regenerate the cube from the archive image: its label is damaged, or was written by a program other than \
         ISIS"
     )]
     Label {
@@ -43,8 +43,8 @@ pub(super) enum CubeError {
         expected: String,
     },
     #[error(
-        "the position table of the cube spans {table_s:.4} s; expected {whole_s:.4} s of the whole image or {part_s:.4} s of this part: \
-         which line it begins with is unknown"
+        "the position table of the cube spans {table_s:.4} s; expected {whole_s:.4} s (whole image) or {part_s:.4} s (part); \
+         the first line of the table is unknown"
     )]
     Span {
         table_s: f64,
@@ -67,11 +67,11 @@ pub(super) enum CubeError {
         state[0], state[1], cube[0], cube[1]
     )]
     #[cause(
-        "run csminit again, with support data of this part of the image: the cube was cropped or reduced after it"
+        "run csminit again, with support data of this part of the image: the cube was cropped or reduced after csminit"
     )]
     StateSize { state: [u32; 2], cube: [u32; 2] },
     #[error(
-        "the state of the camera model belongs to product {state}; expected {label}, which the label names"
+        "the state of the camera model belongs to product {state}; expected {label}, the product in the label"
     )]
     #[cause("run csminit on the cube again, with the support data of its own image")]
     StateOfOther { state: String, label: String },

@@ -232,7 +232,7 @@ fn line_times(
         })?,
     };
     if !(part_s < IMAGE_DURATION_END_S) {
-        let expected = format!("lines of less than {IMAGE_DURATION_END_S} s in all");
+        let expected = format!("lines that take less than {IMAGE_DURATION_END_S} s in total");
         Err(CubeError::Label {
             group: "AlphaCube",
             key: "BetaLines",
@@ -288,7 +288,7 @@ impl Summing {
                 key: "AlphaSamples",
                 value: part.samples.whole.to_string(),
                 expected: format!(
-                    "samples of {crosstrack} pixels from pixel {first} on, within the {pixels} of {}",
+                    "samples of {crosstrack} pixels, beginning with pixel {first}, within the {pixels} pixels of {}",
                     of_image.instrument.name
                 ),
             });
@@ -352,20 +352,20 @@ impl OrientedCube {
         let parts: Vec<String> = parts.into_iter().flatten().collect();
         if !parts.is_empty() {
             notes.push(format!(
-                "the cube shows a part of the camera's image: {}",
+                "the cube contains a part of the camera image: {}",
                 parts.join("; ")
             ));
         }
         if let Orientation::State { model, plugin } = &self.orientation {
             notes.push(format!(
-                "the cube has the state of a camera model by csminit ({model}, {plugin}), in the frame of the body: \
-                 the rotation of the body is taken from the products"
+                "the cube contains the state of a camera model from csminit ({model}, {plugin}), in the body-fixed frame: \
+                 the rotation of the body as in the products is used"
             ));
         }
         notes.extend(self.projection.as_ref().map(|name| {
             format!(
                 "the cube is map-projected ({name}): times and orientation belong to the image before the projection, \
-                 and the cube's pixels are not its samples"
+                 and the pixels of the cube are not samples of that image"
             )
         }));
         notes

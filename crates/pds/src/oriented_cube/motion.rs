@@ -46,7 +46,7 @@ impl Polynomials {
             .map(|row| Vector3::new(row[0], row[1], row[2]))
             .collect();
         let expected = format!(
-            "coefficients of at most degree {DEGREE_MAX}, and a last record of base time, positive time scale and degree"
+            "coefficients up to degree {DEGREE_MAX}, and a last record with base time, positive time scale and degree"
         );
         let refused = || table.refused("Records", rows.len(), &expected);
         let Some((time, coefficients)) = rows.split_last() else {
@@ -112,7 +112,7 @@ fn grid([first_s, last_s]: [f64; 2]) -> Vec<f64> {
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "within the limits of just before"
+        reason = "within the limits checked above"
     )]
     let count = intervals as usize;
     (0..=count).map(|at| first_s + at as f64 * step_s).collect()
@@ -209,7 +209,7 @@ fn slopes(et_s: &[f64], rows: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
 pub(super) fn rotations(table: &Table) -> Result<Rotations, CubeError> {
     let frames = table.codes("TIMEDEPENDENTFRAMES")?;
     if frames.last() != Some(&NAIF_J2000) {
-        let expected = format!("frames from the last one back to {NAIF_J2000}, J2000");
+        let expected = format!("a list of frames that ends with {NAIF_J2000}, J2000");
         return Err(table.refused("TimeDependentFrames", format!("{frames:?}"), expected));
     }
     let (et_s, turning) = match table.fields.len() {
@@ -271,7 +271,7 @@ fn subdivided(rows: &Rotations) -> Rotations {
         #[allow(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
-            reason = "within the limits of just before"
+            reason = "within the limits checked above"
         )]
         let pieces = (length_s / STEP_S).ceil().clamp(1.0, INTERVALS[1]) as usize;
         et_s.extend((1..pieces).map(|piece| pair[0] + piece as f64 / pieces as f64 * length_s));

@@ -69,12 +69,18 @@ impl PartOfAxis {
             let number = text.parse().ok();
             number
                 .filter(|number: &f64| (0.0..=SIZE_MAX).contains(number))
-                .ok_or_else(|| refused(key, text.to_owned(), "a number from 0 within an image"))
+                .ok_or_else(|| {
+                    refused(
+                        key,
+                        text.to_owned(),
+                        "a number from 0 to the largest image size",
+                    )
+                })
         };
         #[allow(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
-            reason = "within the size of an image, as was just tested"
+            reason = "within the size of an image, as checked above"
         )]
         let whole_number = |key: &'static str, value: f64, least: f64, expected: &str| {
             let rounded = value.round();
@@ -92,8 +98,8 @@ impl PartOfAxis {
             ending,
             factor,
             1.0,
-            "a whole number of lines or samples of the image for each of the cube: enlarged and unevenly reduced cubes have no \
-             lines of the camera",
+            "a whole number of image lines or samples per line or sample of the cube: enlarged and unevenly reduced cubes \
+             contain no camera lines",
         )?;
         let first = whole_number(
             starting,

@@ -289,7 +289,7 @@ const CHANGES: [Change; 19] = [
     ),
     (
         |state| state["m_distortionType"] = json!(1),
-        "m_distortionType is 1; expected 0 (radial) or 4 (lrolrocnac)",
+        "m_distortionType is 1; expected one of the supported distortions 0 (radial) and 4 (lrolrocnac)",
     ),
     (
         |state| state["m_focalLength"] = json!("long"),
@@ -311,18 +311,18 @@ const CHANGES: [Change; 19] = [
         |state| {
             state["m_positions"].as_array_mut().unwrap().pop();
         },
-        "expected 3 numbers for each epoch, not 74 in all",
+        "expected 3 numbers per epoch, not 74 in total",
     ),
     (
         |state| state["m_numPositions"] = json!(78),
-        "m_numPositions is 78; expected 75, as many numbers as m_positions has",
+        "m_numPositions is 78; expected 75, the count of numbers in m_positions",
     ),
     (
         |state| {
             let numbers = state["m_velocities"].as_array_mut().unwrap();
             numbers.truncate(72);
         },
-        "expected 72, as many numbers as m_velocities has",
+        "expected 72, the count of numbers in m_velocities",
     ),
     (
         |state| state["m_numQuaternions"] = json!(99),
@@ -338,7 +338,7 @@ const CHANGES: [Change; 19] = [
     ),
     (
         |state| state["m_intTimes"] = json!([1e-3, 1e-3]),
-        "expected 1 entries, one for each of m_intTimeLines, not 2",
+        "expected 1 entries, one per entry of m_intTimeLines, not 2",
     ),
     (
         |state| state["m_t0Quat"] = json!(-0.1),
@@ -350,11 +350,11 @@ const CHANGES: [Change; 19] = [
     ),
     (
         |state| state["m_majorAxis"] = json!(3_397_000.0),
-        "m_majorAxis is 3397000.0; expected with m_minorAxis the radii of Mars, 3396190 and 3376200 m",
+        "m_majorAxis is 3397000.0; expected together with m_minorAxis, the radii of Mars (3396190 and 3376200 m)",
     ),
     (
         |state| state["m_imageIdentifier"] = json!("E02-02016"),
-        "the state of the camera model belongs to product E0202016; expected E0201461, which the label names",
+        "the state of the camera model belongs to product E0202016; expected E0201461, the product in the label",
     ),
 ];
 

@@ -45,7 +45,7 @@ impl Table {
             .saturating_mul(DOUBLE as u64);
         if records == 0 || start == 0 || bytes != expected || bytes > BYTES_MAX {
             let expected = format!(
-                "{expected} bytes of {records} records of {columns} numbers, at most {BYTES_MAX}"
+                "{expected} bytes for {records} records of {columns} numbers, at most {BYTES_MAX} bytes"
             );
             Err(table.refused("Bytes", bytes, expected))?;
         }
@@ -68,7 +68,7 @@ impl Table {
         let all = table.rows.iter().enumerate();
         for (row, numbers) in all {
             if let Some(number) = numbers.iter().find(|number| !number.is_finite()) {
-                let expected = format!("finite numbers; one of record {row} is not");
+                let expected = format!("finite numbers; the invalid number is in record {row}");
                 return Err(table.refused("Records", number, expected).into());
             }
         }

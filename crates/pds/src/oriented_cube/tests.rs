@@ -135,7 +135,7 @@ fn a_cropped_and_a_reduced_cube_have_the_times_of_their_own_lines() {
         assert_eq!(
             cube.notes(),
             [
-                "the cube shows a part of the camera's image: lines 201 to 700 of 1000; samples 101 to 612 of 1024"
+                "the cube contains a part of the camera image: lines 201 to 700 of 1000; samples 101 to 612 of 1024"
             ]
         );
     }
@@ -157,7 +157,7 @@ fn the_clock_that_isis_converted_gives_the_start_of_padded_tables() {
     assert!(
         refused
             .to_string()
-            .contains("which line it begins with is unknown"),
+            .contains("the first line of the table is unknown"),
         "{refused}"
     );
     let digits: String = START_S
@@ -253,7 +253,7 @@ fn what_is_no_oriented_cube_is_refused_with_the_reason() {
     for (part, expected) in [
         (
             alpha([0.5, 1_000.5], [0.5, 1_024.5], [300, 256]),
-            "enlarged and unevenly reduced cubes have no lines of the camera",
+            "enlarged and unevenly reduced cubes contain no camera lines",
         ),
         (
             alpha([0.5, 1_200.5], [0.5, 1_024.5], [1_200, 1_024]),
@@ -276,12 +276,12 @@ fn invalid_tables_are_refused_with_the_reason() {
         (
             1,
             |table| table.rows[1][3] = f64::NAN,
-            "finite numbers; one of record 1 is not",
+            "finite numbers; the invalid number is in record 1",
         ),
         (
             1,
             |table| "  TimeDependentFrames = (-94000, 2)\n".clone_into(&mut table.keywords),
-            "TimeDependentFrames is [-94000, 2]; expected frames from the last one back to 1, J2000",
+            "TimeDependentFrames is [-94000, 2]; expected a list of frames that ends with 1, J2000",
         ),
         (
             0,

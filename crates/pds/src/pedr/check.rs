@@ -193,7 +193,7 @@ fn ellipsoid_radius_m(latitude_rad: f64) -> f64 {
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
-    reason = "radii of Mars in centimetres fit"
+    reason = "radii of Mars in centimetres fit into 32 bits"
 )]
 fn to_cm(metres: f64) -> u32 {
     (metres / METRES_PER_CM).round() as u32
@@ -253,17 +253,17 @@ mod tests {
                     record.time_fraction_us.set(0);
                 },
                 Reason::Time,
-                "time is ET 550000000 s; expected -72705600 to 215784000 s, the mission at Mars",
+                "time is ET 550000000 s; expected -72705600 to 215784000 s, the time of the mission at Mars",
             ),
             (
                 |record| record.clock_frequency_hz.set(50),
                 Reason::Frequency,
-                "clock frequency is 50 Hz; expected within 1 % of 1e8",
+                "clock frequency is 50 Hz; expected 1e8 Hz within 1 %",
             ),
             (
                 |record| record.ground_latitude_microdegrees.set(90_000_001),
                 Reason::Latitude,
-                "ground latitude is 90000001 microdegrees; expected at most 90 degrees",
+                "ground latitude is 90000001 microdegrees; expected -90 to 90 degrees",
             ),
             (
                 |record| record.spacecraft_longitude_microdegrees.set(1 << 30),
@@ -273,33 +273,33 @@ mod tests {
             (
                 |record| record.ground_longitude_change_microdegrees.set(1 << 20),
                 Reason::Track,
-                "the ground track moves by 1048576 microdegrees of longitude and 0 of latitude over the frame, 62154 m; \
+                "the ground track moves by 1048576 microdegrees of longitude and 0 of latitude over the frame (62154 m); \
                  expected at most 50000 m",
             ),
             (
                 |record| record.spacecraft_radius_cm.set(420_000_001),
                 Reason::SpacecraftRadius,
-                "the spacecraft is 420000001 cm from the centre of Mars; expected 340000000 to 420000000",
+                "the spacecraft is 420000001 cm from the centre of Mars; expected 340000000 to 420000000 cm",
             ),
             (
                 |record| record.spacecraft_radius_change_cm.set(-600_001),
                 Reason::SpacecraftRadius,
-                "the spacecraft rises by -600001 cm over the frame; expected at most 600000 either way",
+                "the spacecraft rises by -600001 cm over the frame; expected a change of at most 600000 cm",
             ),
             (
                 |record| record.areoid_radius_cm.set(339_119_000 - 1),
                 Reason::Areoid,
-                "areoid radius is 339118999 cm; expected 339119000 to 340119000 at this latitude",
+                "areoid radius is 339118999 cm; expected 339119000 to 340119000 cm at this latitude",
             ),
             (
                 |record| record.areoid_radius_change_cm.set(50_001),
                 Reason::Areoid,
-                "the areoid rises by 50001 cm over the frame; expected at most 50000 either way",
+                "the areoid rises by 50001 cm over the frame; expected a change of at most 50000 cm",
             ),
             (
                 |record| record.crossover_residual_cm.set(i32::MIN),
                 Reason::Crossover,
-                "crossover residual is -2147483648 cm; expected at most 100000 either way",
+                "crossover residual is -2147483648 cm; expected a magnitude of at most 100000 cm",
             ),
             (
                 |record| record.off_nadir_microdegrees.set(-90_000_001),
@@ -309,7 +309,7 @@ mod tests {
             (
                 |record| record.spacecraft_latitude_change_microdegrees.set(1 << 18),
                 Reason::Track,
-                "the spacecraft moves by 0 microdegrees of longitude and 262144 of latitude over the frame, 17295 m; \
+                "the spacecraft moves by 0 microdegrees of longitude and 262144 of latitude over the frame (17295 m); \
                  expected at most 15000 m",
             ),
         ];

@@ -62,7 +62,7 @@ pub enum RecordError {
     NoTime(f64),
     /// The spacecraft was not at Mars at this time.
     #[error(
-        "time is ET {} s; expected {} to {} s, the mission at Mars",
+        "time is ET {} s; expected {} to {} s, the time of the mission at Mars",
         legible(*.0), bounds::MISSION_S.start(), bounds::MISSION_S.end()
     )]
     OutsideMission(f64),
@@ -79,7 +79,7 @@ pub enum RecordError {
     Order(f64),
     /// Another record of the file contains the same shots.
     #[error(
-        "time is {time_s} s, which repeats the shots of record {record}; expected every shot once, frames {} s or more apart",
+        "time is {time_s} s, which repeats the shots of record {record}; expected every shot once, in frames at least {} s apart",
         bounds::APART_S
     )]
     Repeated {
@@ -89,10 +89,10 @@ pub enum RecordError {
         record: u32,
     },
     /// Clock frequency, hertz.
-    #[error("clock frequency is {0} Hz; expected within 1 % of 1e8")]
+    #[error("clock frequency is {0} Hz; expected 1e8 Hz within 1 %")]
     Frequency(u32),
     /// Ground or spacecraft latitude.
-    #[error("{whose} latitude is {microdegrees} microdegrees; expected at most 90 degrees")]
+    #[error("{whose} latitude is {microdegrees} microdegrees; expected -90 to 90 degrees")]
     Latitude {
         /// "ground" or "spacecraft".
         whose: &'static str,
@@ -110,7 +110,7 @@ pub enum RecordError {
     /// Displacement of the ground track or of the spacecraft over the frame.
     #[error(
         "{whose} moves by {longitude_microdegrees} microdegrees of longitude and {latitude_microdegrees} of latitude \
-         over the frame, {metres:.0} m; expected at most {limit_m} m"
+         over the frame ({metres:.0} m); expected at most {limit_m} m"
     )]
     Track {
         /// "the ground track" or "the spacecraft".
@@ -125,16 +125,16 @@ pub enum RecordError {
         limit_m: f64,
     },
     /// Distance of the spacecraft, centimetres.
-    #[error("the spacecraft is {0} cm from the centre of Mars; expected {min} to {max}",
+    #[error("the spacecraft is {0} cm from the centre of Mars; expected {min} to {max} cm",
         min = if *.1 { bounds::MAPPING_ORBIT_CM.start() } else { bounds::EARLIER_ORBIT_CM.start() },
         max = if *.1 { bounds::MAPPING_ORBIT_CM.end() } else { bounds::EARLIER_ORBIT_CM.end() })]
     SpacecraftRadius(u32, bool),
     /// Change of the distance of the spacecraft over the frame, centimetres.
     #[error(
-        "the spacecraft rises by {0} cm over the frame; expected at most {limit} either way", limit = bounds::CLIMB_MAX_CM)]
+        "the spacecraft rises by {0} cm over the frame; expected a change of at most {limit} cm", limit = bounds::CLIMB_MAX_CM)]
     Climb(i32),
     /// Radius of a returned shot (0: of the mid-point), centimetres.
-    #[error("radius of {} is {centimetres} cm; expected {} to {} for a return",
+    #[error("radius of {} is {centimetres} cm; expected {} to {} cm for a return",
         if *.shot == 0 { "the mid-point".to_owned() } else { format!("shot {shot}") },
         bounds::RADIUS_CM.start(), bounds::RADIUS_CM.end())]
     Radius {
@@ -189,10 +189,10 @@ pub enum RecordError {
     },
     /// Crossover residual, centimetres.
     #[error(
-        "crossover residual is {0} cm; expected at most {limit} either way", limit = bounds::CROSSOVER_MAX_CM)]
+        "crossover residual is {0} cm; expected a magnitude of at most {limit} cm", limit = bounds::CROSSOVER_MAX_CM)]
     Crossover(i32),
     /// Areoid radius, centimetres.
-    #[error("areoid radius is {centimetres} cm; expected {} to {} at this latitude", .expected_cm[0], .expected_cm[1])]
+    #[error("areoid radius is {centimetres} cm; expected {} to {} cm at this latitude", .expected_cm[0], .expected_cm[1])]
     AreoidRadius {
         /// The value of the record.
         centimetres: u32,
@@ -201,13 +201,14 @@ pub enum RecordError {
     },
     /// Change of the areoid radius over the frame, centimetres.
     #[error(
-        "the areoid rises by {0} cm over the frame; expected at most {limit} either way", limit = bounds::AREOID_CHANGE_MAX_CM)]
+        "the areoid rises by {0} cm over the frame; expected a change of at most {limit} cm",
+        limit = bounds::AREOID_CHANGE_MAX_CM)]
     AreoidChange(i32),
     /// Off-nadir angle, microdegrees.
     #[error("off-nadir angle is {0} microdegrees; expected at most 90 degrees")]
     OffNadir(i32),
     /// The neighbours on both sides agree on another value.
-    #[error("{what} is {found}; expected {expected} as in the records before and after")]
+    #[error("{what} is {found}; expected {expected}, as in the neighbouring records")]
     OddOne {
         /// Name of the field.
         what: &'static str,

@@ -60,7 +60,7 @@ struct NotAFile;
 #[derive(Debug, thiserror::Error, Cause)]
 #[error("no valid record: {why}")]
 #[cause(Input: "{}", foreign.map_or(
-    "fetch the file again if it is a PEDR file (AP#####v.B), else leave it out",
+    "fetch the file again if it is a PEDR file (AP#####v.B), otherwise omit it",
     Foreign::advice,
 ))]
 struct NoGoodRecord {
@@ -143,7 +143,7 @@ impl File {
         let length = self.length;
         if length < LABEL_BYTES as u64 {
             let text = format!(
-                "the file has {length} bytes; expected at least the {LABEL_BYTES} of the label"
+                "the file has {length} bytes; expected at least the {LABEL_BYTES} bytes of the label"
             );
             self.complain_of_label(Reason::TruncatedLabel, text);
         }
@@ -155,7 +155,7 @@ impl File {
         self.label_records = label_records(&self.bytes, stated, self.is_mapping(), self.guard());
         if self.label_records != LABEL_RECORDS {
             let text = format!(
-                "records begin after {} of the label; expected after {LABEL_RECORDS}",
+                "records begin after {} label records; expected {LABEL_RECORDS} label records",
                 self.label_records
             );
             self.complain_of_label(Reason::LabelKeyword, text);
@@ -165,7 +165,7 @@ impl File {
         }
         let records = (self.label_records + self.record_count()) as u64;
         if let Some(stated) = self.label.file_records.filter(|stated| *stated != records) {
-            let text = format!("the label states {stated} records; the file holds {records}");
+            let text = format!("the label states {stated} records; the file contains {records}");
             self.complain_of_label(Reason::RecordCount, text);
         }
     }
@@ -221,8 +221,9 @@ impl File {
         let data = self.length.checked_sub(self.label_length() as u64)?;
         let trailing = data % RECORD_BYTES as u64;
         (trailing > 0).then(|| {
-            let text =
-                format!("{trailing} bytes after the last whole record of {RECORD_BYTES}; ignored");
+            let text = format!(
+                "{trailing} bytes after the last whole record of {RECORD_BYTES} bytes are ignored"
+            );
             self.complaint(
                 Some(self.record_number(self.record_count())),
                 Reason::TrailingBytes,

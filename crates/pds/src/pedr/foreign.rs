@@ -35,7 +35,7 @@ impl Foreign {
         match self {
             Self::Gzip => "decompress it (gunzip), and name the resulting file",
             Self::LittleEndian => {
-                "fetch the archive's file: PEDR records are big-endian, and a program has swapped these"
+                "fetch the archive file: PEDR records are big-endian, but a program swapped the bytes of this file"
             }
             Self::Text => "fetch the binary PEDR (AP#####v.B) of the same orbits",
         }
@@ -45,9 +45,9 @@ impl Foreign {
 impl fmt::Display for Foreign {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter.write_str(match self {
-            Self::Gzip => "the file is compressed by gzip; expected records of 776 bytes",
-            Self::LittleEndian => "the records are little-endian; expected big-endian ones",
-            Self::Text => "the file holds text, as an ASCII PEDR does; expected binary records",
+            Self::Gzip => "the file is compressed with gzip; expected records of 776 bytes",
+            Self::LittleEndian => "the records are little-endian; expected big-endian records",
+            Self::Text => "the file contains text, like an ASCII PEDR; expected binary records",
         })
     }
 }

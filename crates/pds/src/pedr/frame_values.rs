@@ -6,7 +6,7 @@ use areograph_base::error::Cause;
 /// A value does not fit its field of the record.
 #[derive(Debug, Clone, PartialEq, thiserror::Error, Cause)]
 #[error("{field} is {value}; expected {expected}")]
-#[cause(Input: "check the unit of the value: records are written from metres, radians and seconds")]
+#[cause(Input: "check the unit of the value: records are written from values in metres, radians and seconds")]
 pub struct EncodeError {
     /// The field.
     pub field: &'static str,

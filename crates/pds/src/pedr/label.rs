@@ -101,7 +101,7 @@ impl PedrLabel {
         }
         let marker = || {
             let expected = String::from_utf8_lossy(MARKER);
-            format!("the label does not begin with {expected}, as the archive's files do")
+            format!("the label does not begin with {expected}, unlike the labels of archive files")
         };
         let mut found: Vec<String> = (!self.has_marker).then(marker).into_iter().collect();
         let label_records = self.label_records.map(|records| records.to_string());
@@ -182,7 +182,7 @@ fn datums_in(text: &str) -> Vec<Datum> {
 pub enum DatumError {
     /// Neither name nor label state it.
     #[error(
-        "the datum is unknown: the file name has no version letter A to L and the label names no datum"
+        "the datum is unknown: the file name has no version letter A to L, and the label states no datum"
     )]
     #[cause(
         "set pedr.datum in the configuration (iau1991, iau1994 or iau2000), or restore the archive's file name"
@@ -191,7 +191,7 @@ pub enum DatumError {
     /// Two sources disagree.
     #[error("{first} implies {first_datum}, but {second} implies {second_datum}")]
     #[cause(
-        "check whether the file was renamed or converted; version L is iau2000, earlier versions iau1991"
+        "check whether the file was renamed or converted; version L is iau2000, earlier versions are iau1991"
     )]
     Contradiction {
         /// One source.
@@ -311,7 +311,7 @@ mod tests {
                 None,
                 None,
                 Err(
-                    "the datum is unknown: the file name has no version letter A to L and the label names no datum",
+                    "the datum is unknown: the file name has no version letter A to L, and the label states no datum",
                 ),
             ),
             (
@@ -319,7 +319,7 @@ mod tests {
                 Some('M'),
                 None,
                 Err(
-                    "the datum is unknown: the file name has no version letter A to L and the label names no datum",
+                    "the datum is unknown: the file name has no version letter A to L, and the label states no datum",
                 ),
             ),
             (

@@ -59,7 +59,7 @@ pub struct Stretch {
 #[derive(Debug, thiserror::Error, Cause)]
 #[cause(Input: "run again when no other program is writing to the PEDR files")]
 enum Changed {
-    #[error("the file ended early while it was read: it had {0} bytes when it was opened")]
+    #[error("the file was truncated while it was read: it had {0} bytes when opened")]
     Shorter(u64),
     #[error("the file changed while it was read")]
     Content,
@@ -390,7 +390,10 @@ mod tests {
             failure.to_string()
         };
         let said = refused(&|file| file.set_len(9_000).unwrap());
-        assert!(said.contains("ap19019l.b: the file ended early"), "{said}");
+        assert!(
+            said.contains("ap19019l.b: the file was truncated"),
+            "{said}"
+        );
         let said = refused(&|file| file.set_len(10_000).unwrap());
         assert!(said.contains("the file changed while"), "{said}");
         // Other bytes, the same length: the time reveals the change.

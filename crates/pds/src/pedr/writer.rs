@@ -30,7 +30,7 @@ pub struct LabelInfo {
 
 /// The label does not fit its format.
 #[derive(Debug, Clone, PartialEq, thiserror::Error, Cause)]
-#[cause(Input: "shorten or correct the text that goes into the label")]
+#[cause(Input: "shorten or correct the text for the label")]
 pub(super) enum LabelError {
     /// A version that does not fit into four characters.
     #[error("software version is {0}; expected 0 to 9.99")]

@@ -74,7 +74,7 @@ impl Core<'_> {
             .parse()
             .ok()
             .filter(|count| (1..=most).contains(count));
-        count.ok_or_else(|| refused(key, value, "a count from 1, as an image can have"))
+        count.ok_or_else(|| refused(key, value, "a count from 1 to the largest image size"))
     }
 
     fn number(&self, key: &'static str, usual: f64) -> std::result::Result<f64, PixelFileError> {
@@ -159,7 +159,7 @@ impl Cube {
             Err(refused(
                 "TILELINES",
                 &lines.to_string(),
-                "tiles of which a row across the image has at most 16 million pixels",
+                "tiles with at most 16 million pixels per row of tiles",
             ))?;
         }
         let found = path.metadata().map_err(IoError::on("read"))?.len();

@@ -74,7 +74,7 @@ impl Picture {
             return Ok([lines, samples]);
         }
         Err(self.refused(format!(
-            "{lines} lines of {samples} samples; expected at most {LINES_MAX} of {SAMPLES_MAX}"
+            "{lines} lines of {samples} samples; expected at most {LINES_MAX} lines of {SAMPLES_MAX} samples"
         )))
     }
 }
@@ -106,7 +106,7 @@ impl TiffRows {
         let size = Picture::Tiff.check_size(lines, samples)?;
         let colour = decoder.colortype().map_err(refused)?;
         let tiff::ColorType::Gray(bits) = colour else {
-            return Err(Picture::Tiff.refused(format!("{colour:?}; expected one band of grey")));
+            return Err(Picture::Tiff.refused(format!("{colour:?}; expected one greyscale band")));
         };
         let (across, down) = match decoder.get_chunk_type() {
             ChunkType::Strip => (samples, decoder.chunk_dimensions().1),
@@ -117,7 +117,7 @@ impl TiffRows {
         }
         if !fits(down.min(lines), samples) {
             return Err(Picture::Tiff.refused(format!(
-                "strips or tiles of {down} lines; expected at most 16 million pixels in a row of them"
+                "strips or tiles of {down} lines; expected at most 16 million pixels per row of strips or tiles"
             )));
         }
         Ok(Self {
@@ -141,7 +141,7 @@ impl TiffRows {
             DecodingResult::F64(numbers) => numbers,
             _ => {
                 return Err(Picture::Tiff
-                    .refused("pixels of another type; expected 8 unsigned bits, 16 or 32 bits"));
+                    .refused("unsupported pixel type; expected 8 unsigned bits, 16 or 32 bits"));
             }
         })
     }
@@ -220,7 +220,7 @@ impl PngRows {
             ColorType::Grayscale => 1,
             ColorType::GrayscaleAlpha => 2,
             other => {
-                return Err(Picture::Png.refused(format!("{other:?}; expected one band of grey")));
+                return Err(Picture::Png.refused(format!("{other:?}; expected one greyscale band")));
             }
         };
         let bytes = if depth == BitDepth::Sixteen { 2 } else { 1 };
@@ -269,7 +269,7 @@ impl Rows for PngRows {
                 .next_row()
                 .map_err(|error| Picture::Png.refused(error))?;
             let Some(row) = row.map(|row| row.data().to_vec()) else {
-                return Err(Picture::Png.refused("it ends before its last line"))?;
+                return Err(Picture::Png.refused("the file ends before the last line"))?;
             };
             let pixels = row.chunks_exact(self.bytes[1]);
             numbers.extend(pixels.map(|pixel| self.number(pixel)));

@@ -43,7 +43,7 @@ impl Scale {
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "clamped to a byte just before, and NaN becomes 0"
+        reason = "clamped to the range of a byte; NaN becomes 0"
     )]
     pub(super) fn byte(self, number: f64) -> u8 {
         match self {

@@ -339,9 +339,10 @@ impl Time {
         match (self, utc) {
             (Self::Et(field), _) => field.within(record, limits_s),
             (Self::Utc(field), Some(utc)) => Ok(field.instant(record, utc)?.seconds()),
-            (Self::Utc(field), None) => {
-                Err(field.refused(field.text(record)?, "leap seconds for times in UTC"))
-            }
+            (Self::Utc(field), None) => Err(field.refused(
+                field.text(record)?,
+                "leap seconds, which times in UTC require",
+            )),
         }
     }
 }

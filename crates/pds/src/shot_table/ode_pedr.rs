@@ -151,7 +151,7 @@ pub(super) fn shot(
         let [least_m, most_m] =
             [AREOID_M, -AREOID_M].map(|apart_m| radius_m - ellipsoid_m - apart_m);
         let expected = format!(
-            "a number from {least_m:.0} to {most_m:.0}: planet_rad minus the radius of the areoid"
+            "a number from {least_m:.0} to {most_m:.0}: planet_rad minus the areoid radius"
         );
         return Err(topography.refused(topography.text(record)?, &expected));
     }
@@ -186,7 +186,7 @@ fn et_s(record: &StringRecord, utc: Option<Utc<'_>>) -> std::result::Result<f64,
         return Ok(et_s);
     }
     let expected = format!(
-        "{by_utc_s:.3} s within {:.0} ms, by the UTC of the row, {}",
+        "{by_utc_s:.3} s within {:.0} ms, according to the UTC of the row, {}",
         1e3 * TIMES_AGREE_S,
         written.text(record)?
     );

@@ -95,7 +95,10 @@ fn reach_m(shot: &Footprint) -> f64 {
     shot.radius_m + shot.range_m
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "belts are a few hundred")]
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "there are a few hundred belts"
+)]
 fn belt(shot: &Footprint) -> i32 {
     (shot.latitude_rad / BELT_RAD).floor() as i32
 }

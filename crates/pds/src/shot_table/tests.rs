@@ -144,7 +144,7 @@ fn every_bad_row_is_told_with_its_line_and_the_good_ones_are_kept() {
         ),
         (
             "1.0,99.0,60.0,1735.0,157.0,99.0,60.0,1792.0",
-            "the range is 157000 m; expected the distance of spacecraft and footprint, 57000 m, within 2570 m",
+            "the range is 157000 m; expected the distance between spacecraft and footprint, 57000 m, within 2570 m",
         ),
     ];
     let mut text = format!("{HEADER}\n{ROW}\n");

@@ -113,7 +113,7 @@ impl GeoKeys {
             return Err(refused(
                 "GeogSemiMajorAxis and GeogSemiMinorAxis",
                 format!("{major_m} and {minor_m} m"),
-                "a sphere: latitudes are areocentric, and heights count from it",
+                "a sphere: latitudes are areocentric, and heights refer to the sphere",
             ));
         }
         Ok(Some(major_m))

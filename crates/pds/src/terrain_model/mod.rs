@@ -39,14 +39,14 @@ pub enum TerrainModelError {
     /// Its library rejects it, or a tag.
     #[error("{0}")]
     #[cause(
-        "give a whole GeoTIFF of one band without compression, with LZW or with deflate (gdal_translate -co \
-         COMPRESS=DEFLATE), cut to the area needed (-projwin)"
+        "give a complete GeoTIFF of one band, uncompressed or with LZW or deflate compression (gdal_translate -co \
+         COMPRESS=DEFLATE), cut to the required area (-projwin)"
     )]
     Tiff(String),
     /// An error in its georeference.
     #[error("{what}: {found}; expected {expected}")]
     #[cause(
-        "give heights over longitude and latitude or in an equirectangular map about a sphere, in degrees or metres: \
+        "give heights on a grid of longitude and latitude, or in an equirectangular map of a sphere, in degrees or metres: \
          gdalwarp -t_srs '+proj=eqc +R=3396190 +units=m'"
     )]
     Georeference {
@@ -67,15 +67,15 @@ pub enum TerrainModelError {
         columns: u32,
     },
     /// The radius is unknown.
-    #[error("no key defines the reference sphere of its heights")]
-    #[cause("state it with --radius-m; Mars has models above 3396000 m and above 3396190 m")]
+    #[error("no key defines the reference sphere of the heights")]
+    #[cause("state the radius with --radius-m; models of Mars refer to 3396000 m or 3396190 m")]
     NoRadius,
     /// Two different radii.
     #[error(
-        "the sphere of its map has a radius of {of_file} m; the stated radius of the heights is {given} m"
+        "the map sphere has a radius of {of_file} m; the stated radius of the heights is {given} m"
     )]
     #[cause(
-        "leave --radius-m out, or add --heights-apart if heights refer to a sphere other than the map's"
+        "omit --radius-m, or add --heights-apart if the heights refer to a sphere other than the map sphere"
     )]
     TwoRadii {
         /// By the file.
@@ -87,7 +87,7 @@ pub enum TerrainModelError {
     #[error(
         "the sphere has a radius of {found} m; expected the radius of {body}, {expected} m, within 2 %"
     )]
-    #[cause("give a model of this body, its radius in metres")]
+    #[cause("give a terrain model of this body, with the radius in metres")]
     OtherBody {
         /// Its radius.
         found: f64,
@@ -98,7 +98,7 @@ pub enum TerrainModelError {
     },
     /// A value that cannot be a height.
     #[error(
-        "row {row}, column {column} (from 0) has the height {value}; expected metres within {HEIGHT_MAX_M} of the sphere"
+        "row {row}, column {column} (from 0) has the height {value}; expected a height within {HEIGHT_MAX_M} m of the sphere"
     )]
     #[cause(
         "set the no-data value of the file (gdal_edit.py -a_nodata), and give heights in metres"
@@ -112,7 +112,7 @@ pub enum TerrainModelError {
         value: f64,
     },
     /// No cell has a height.
-    #[error("none of its cells has a height")]
+    #[error("no cell has a height")]
     #[cause("check the file and its no-data value")]
     Empty,
 }
@@ -212,7 +212,7 @@ impl Tags {
         let of_scale = |found: &[f64]| TerrainModelError::Georeference {
             what: "ModelPixelScale and ModelTiepoint",
             found: format!("{found:?}"),
-            expected: "the size of a cell, above 0, and one tie point: a map that is neither turned nor mirrored",
+            expected: "a positive cell size and one tie point: a map that is neither rotated nor mirrored",
         };
         let (Some([width, height]), Some([column, row, _, x, y, _])) =
             (self.scale.first_chunk::<2>(), self.tie.first_chunk::<6>())
@@ -252,7 +252,7 @@ impl Tags {
 
     #[allow(
         clippy::cast_possible_truncation,
-        reason = "a height within 30 km of the sphere keeps 2 mm"
+        reason = "heights within 30 km of the sphere are rounded to 2 mm"
     )]
     fn heights(&self, path: &Path) -> Result<Vec<f32>> {
         let columns = self.size[1] as usize;

@@ -105,7 +105,7 @@ fn known(block: &BlockEntries<'_>) -> std::result::Result<Option<KnownGround>, S
     let coordinates = ["APRIORIX", "APRIORIY", "APRIORIZ"].map(|key| block.finite(key));
     let [Some(x_m), Some(y_m), Some(z_m)] = coordinates else {
         return Err(format!(
-            "its type is {kind}, but AprioriX, AprioriY and AprioriZ are not three numbers; it is taken as free"
+            "its type is {kind}, but AprioriX, AprioriY and AprioriZ are not three numbers; the point is treated as free"
         ));
     };
     let covariance_m2 = match (fixed, block.value("APRIORICOVARIANCEMATRIX")) {
@@ -113,7 +113,7 @@ fn known(block: &BlockEntries<'_>) -> std::result::Result<Option<KnownGround>, S
         (false, Some(text)) => Some(covariance_m2(text)?),
         (false, None) => {
             return Err(
-                "its type is Constrained, but it has no AprioriCovarianceMatrix; it is taken as free"
+                "its type is Constrained, but it has no AprioriCovarianceMatrix; the point is treated as free"
                     .to_owned(),
             );
         }
@@ -139,7 +139,7 @@ fn covariance_m2(text: &str) -> std::result::Result<Matrix3<f64>, String> {
         .ok_or_else(|| {
             format!(
                 "AprioriCovarianceMatrix ({text}): expected the six numbers of the upper triangle of a positive definite \
-                 matrix, m²; it is taken as free"
+                 matrix, m²; the point is treated as free"
             )
         })
 }

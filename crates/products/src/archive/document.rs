@@ -40,9 +40,9 @@ struct Document<'a> {
     /// Always `areograph archive ranges 1`.
     #[schemars(extend("const" = "areograph archive ranges 1"))]
     format: &'static str,
-    /// Whether every file could be read, and every profile is covered by the kernels and keeps the limits.
+    /// Whether every file could be read, and every profile is covered by the kernels and within the limits.
     verdict: &'a Verdict,
-    /// Limits and the scan of clock biases.
+    /// Limits, and settings for the scan of clock biases.
     limits: &'a RangeCheckConfig,
     /// The clock of MOLA.
     mola_clock: &'a MolaClock,
@@ -102,7 +102,7 @@ struct FileDocument<'a> {
     profiles: usize,
     /// Shots that were checked.
     shots: u64,
-    /// Shots without a position in the kernels.
+    /// Number of shots without a spacecraft position in the kernels.
     not_covered: u64,
     /// Number of problems of records and label.
     complaint_count: u64,

@@ -120,7 +120,7 @@ struct RoundDocument {
     /// Median length of the shifts of kept units that calibrate, cells; absent where none was kept.
     #[serde(skip_serializing_if = "Option::is_none")]
     shift_cells: Option<f64>,
-    /// Median of model minus laser, metres.
+    /// Median of model minus laser height, metres.
     #[serde(skip_serializing_if = "Option::is_none")]
     bias_m: Option<f64>,
     /// Residuals of control, root mean square over all lines.

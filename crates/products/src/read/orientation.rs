@@ -16,7 +16,7 @@ use areograph_base::{
 pub struct SampleRow {
     /// Epoch.
     pub et: Et,
-    /// Lines from the middle of the header image.
+    /// Line offset from the middle of the header image, lines.
     pub line_offset: f64,
     /// Perspective centre.
     pub position: Position<BodyFixed>,

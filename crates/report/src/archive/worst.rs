@@ -15,7 +15,7 @@ pub(super) fn worst_profiles(ranges: &ArchiveRanges, worst: &[WorstProfile<'_>])
         return paragraph("No profile was checked.");
     }
     let mut table = Table::new(
-        "Profiles by the largest share of a limit; each links to its shots (Parquet)",
+        "Profiles, sorted by the largest share of a limit; each links to its shots (Parquet)",
         &[
             Column::Text("profile"),
             Column::Text("begins"),
@@ -51,10 +51,10 @@ pub(super) fn worst_profiles(ranges: &ArchiveRanges, worst: &[WorstProfile<'_>])
         ];
         table.row(profile.invalid_because.is_empty(), cells);
     }
-    let words = "Mean and distance to the file's own spacecraft are without outliers. Orbits apart is the mean spacecraft \
-                 position of the file minus the position in the kernels; it reveals a different orbit, clock or datum. The \
-                 best correction of time tags is the one that minimises the spread of ranges, with raw radii or with radii \
-                 corrected by crossovers. All profiles are in profiles.parquet and profiles.csv.";
+    let words = "Outliers are excluded from the mean and from the distance to the spacecraft in the file itself. Orbits apart \
+                 is the mean difference of spacecraft positions, file minus kernels; it reveals a different orbit, clock or \
+                 datum. The best time-tag correction minimises the spread of ranges, with raw or crossover-corrected \
+                 radii. All profiles are in profiles.parquet and profiles.csv.";
     html! { (table.finish()) p { (words) } (commands(worst)) }
 }
 

@@ -87,7 +87,7 @@ pub(super) fn figure_of(site: &RunDifference) -> Result<Markup> {
         }
     }
     let words = format!(
-        "Positions in A and their movements to B, {times} × magnified: {}. Kilometres east and north of their mean.",
+        "Positions in A and movements to B, magnified {times} ×: {}. Axes: kilometres east and north of the mean position.",
         parts.join(", ")
     );
     let title = format!("{}: movements on the ground", site.site);

@@ -20,9 +20,9 @@ pub(super) fn tables(site: &RunDifference) -> Markup {
             (positions(&images, &site.limits))
             (pointing(&images, &site.limits))
             p {
-                "Samples are matched by image line. Radial (up), along the flight and cross (angular momentum) are axes of A's \
-                 orbit; signed columns are means. Turns are about the camera's axes; z is the boresight. Pointing alone: turn × \
-                 range. Ground point: where the boresight meets the ellipsoid."
+                "Samples are matched by image line. Radial (up), along (flight) and cross (angular momentum) are axes of the \
+                 orbit in A; signed columns are means. Rotations are about the camera axes; z is the boresight. Pointing alone: \
+                 rotation × range. Ground point: intersection of the boresight with the ellipsoid."
             }
         }
     }
@@ -121,8 +121,8 @@ fn pointing(images: &[&ImageDifference], limits: &Limits) -> Markup {
         "Camera pointing",
         &[
             Column::Text("image"),
-            Column::Number("turn mean, ″"),
-            Column::Number("turn max, ″"),
+            Column::Number("rotation mean, ″"),
+            Column::Number("rotation max, ″"),
             Column::Number("about x, ″"),
             Column::Number("about y, ″"),
             Column::Number("about z, ″"),
@@ -179,11 +179,11 @@ pub(super) fn plots(site: &RunDifference) -> Result<Markup> {
         };
         let mut panels = Vec::new();
         if movement.distance_m.moved() {
-            panels.push(panel("camera moved, m", movement, POSITION, 0));
+            panels.push(panel("camera movement, m", movement, POSITION, 0));
         }
         if movement.turn_arcsec.moved() {
             // Other colours, since the legend is common to both panels.
-            panels.push(panel("camera turned, arcsec", movement, POINTING, 3));
+            panels.push(panel("camera rotation, arcsec", movement, POINTING, 3));
         }
         if !panels.is_empty() {
             figures.push(figure(&Plot::of(

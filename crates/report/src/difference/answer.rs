@@ -11,7 +11,7 @@ use areograph_base::schema::DocumentSchema;
 #[schemars(
     title = "Differences between two runs",
     description = "Answer of `areograph report diff --json`: differences of every site in both outputs, B - A. \
-                   Metres, arcseconds and seconds; unknown values are omitted."
+                   Units are metres, arcseconds and seconds; unknown values are omitted."
 )]
 pub struct Answer<'a> {
     /// Sites of both.
@@ -22,7 +22,7 @@ pub struct Answer<'a> {
     pub only_in_b: &'a [String],
 }
 
-/// Result of comparing a site of both outputs.
+/// Result of the comparison of a site in both outputs.
 #[derive(Debug, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum SiteAnswer<'a> {
@@ -34,7 +34,7 @@ pub enum SiteAnswer<'a> {
         site: &'a str,
         /// Why.
         error: String,
-        /// Exit code of such a failure.
+        /// Exit code of this failure.
         #[schemars(range(min = 1))]
         exit_code: u8,
     },

@@ -11,15 +11,15 @@ use areograph_store::manifest::Manifest;
 /// Numbers that differ by less than this fraction of the larger one are equal except for rounding.
 const ROUNDING_SHARE: f64 = 1e-6;
 
-/// A value that differs; missing where a run does not have it.
+/// A value that differs between the runs; missing for a run without this value.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Change {
-    /// Key, with dots between tables.
+    /// Key; dots separate the names of tables and keys.
     pub what: String,
-    /// In the first run.
+    /// Value in the first run.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub a: Option<Value>,
-    /// In the second run.
+    /// Value in the second run.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub b: Option<Value>,
 }
@@ -27,9 +27,9 @@ pub struct Change {
 /// Texts of one run only.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Texts {
-    /// Only in the first run.
+    /// Texts only in the first run.
     pub only_in_a: Vec<String>,
-    /// Only in the second run.
+    /// Texts only in the second run.
     pub only_in_b: Vec<String>,
 }
 

@@ -7,11 +7,11 @@ use areograph_base::error::Cause;
 pub(super) enum DifferenceError {
     /// Neither a site's folder nor a folder of sites.
     #[error("no manifest.json in this folder or below it; expected products of `areograph run`")]
-    #[cause(Input: "name the folder given to --out, or a site's folder in it")]
+    #[cause(Input: "name the folder given to --out, or a site folder in it")]
     NoProducts,
     /// Two names of one folder.
     #[error("A and B are the same folder; expected the products of two runs")]
-    #[cause("copy the first products elsewhere before running again, or run into another --out")]
+    #[cause("copy the first products elsewhere before the second run, or use a different --out")]
     SameFolder,
     /// A site's folder beside a folder of sites.
     #[error(
@@ -20,11 +20,11 @@ pub(super) enum DifferenceError {
     #[cause("name two folders of one site, or two output folders with sites")]
     OneAndSeveral,
     /// Products of two sites.
-    #[error("these are products of site \"{b}\", the others of site \"{a}\"; expected one site")]
+    #[error("these products belong to site \"{b}\", the others to site \"{a}\"; expected one site")]
     #[cause("compare runs of the same site")]
     DifferentSites { a: String, b: String },
     /// Two roots without a common site.
-    #[error("A and B have no site in common: A has {a}; B has {b}")]
+    #[error("A and B have no site in common: A contains {a}; B contains {b}")]
     #[cause(like = DifferentSites)]
     NoneInBoth { a: String, b: String },
 }

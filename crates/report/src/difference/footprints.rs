@@ -16,13 +16,13 @@ use areograph_products::read::{FootprintRows, read_footprints};
 /// Footprints of both runs, matched by file, orbit, record and shot.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct FootprintsDifference {
-    /// In both runs.
+    /// Number of footprints in both runs.
     pub matched: usize,
-    /// Only in the first run.
+    /// Number of footprints only in the first run.
     pub only_in_a: usize,
-    /// Only in the second run.
+    /// Number of footprints only in the second run.
     pub only_in_b: usize,
-    /// Movement of those in both; missing if none is in both.
+    /// Movement of the footprints in both runs; missing if there are none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub movement: Option<FootprintsMovement>,
 }
@@ -30,15 +30,15 @@ pub struct FootprintsDifference {
 /// Movement of the footprints that are in both runs.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct FootprintsMovement {
-    /// Number that moved by more than rounding.
+    /// Number of footprints that moved by more than rounding.
     pub moved: usize,
-    /// Distance between the points with raw radii.
+    /// Distance between the positions in both runs, with raw radii.
     pub distance_m: Size,
     /// Change of the height above the areoid, after the crossover correction.
     pub topography_m: Component,
     /// Change of the corrected shot time.
     pub time_s: Component,
-    /// The shot that moved farthest, if one moved.
+    /// Shot whose footprint moved farthest; missing if none moved.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub farthest: Option<ShotName>,
     /// A sample of the shots.
@@ -53,7 +53,7 @@ pub struct ShotName {
     pub source_file: String,
     /// Orbit.
     pub orbit: u32,
-    /// Record of the file, counted from 1.
+    /// Record in the file, counted from 1.
     #[schemars(range(min = 1))]
     pub record: u32,
     /// Shot in the frame.

@@ -23,26 +23,26 @@ use areograph_products::read::{ImageDocument, SampleRow, read_samples};
 /// is 2e-5 of the shortest line.
 const SAME_LINE: f64 = 1e-3;
 
-/// An image in both runs or in one.
+/// An image in one or both runs.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct ImageDifference {
-    /// Image identifier, with `, adjusted` where it is the adjusted orientation.
+    /// Image identifier, followed by `, adjusted` for the adjusted orientation.
     pub image: String,
-    /// Whether its model is within the limits in the first run; missing if the image is absent.
+    /// Whether the sensor model is within the limits in the first run; missing if the image is absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub valid_in_a: Option<bool>,
-    /// Whether its model is within the limits in the second run; missing if the image is absent.
+    /// Whether the sensor model is within the limits in the second run; missing if the image is absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub valid_in_b: Option<bool>,
-    /// Times and keys of the camera that differ.
+    /// Differing image times and camera keys.
     pub times: Vec<Change>,
-    /// Statistics of the polynomial models that differ.
+    /// Differing statistics of the polynomial models.
     pub models: Vec<Change>,
-    /// Samples only in the first run; samples of both runs are in the movement.
+    /// Number of samples only in the first run; `movement` contains the samples of both runs.
     pub samples_only_in_a: usize,
-    /// Samples only in the second run.
+    /// Number of samples only in the second run.
     pub samples_only_in_b: usize,
-    /// Movement of samples in both runs; missing if there are none.
+    /// Movement of the samples in both runs; missing if there are none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub movement: Option<ImageMovement>,
 }
@@ -59,14 +59,14 @@ impl ImageDifference {
     }
 }
 
-/// Movement of the camera over the samples that both runs have, matched by image line.
+/// Movement of the camera at the samples of both runs, matched by image line.
 ///
-/// Radial, along and cross are the axes of the first run: away from Mars, along the flight in inertial space, along the
-/// orbit's angular momentum. Turns about x, y and z refer to the camera's own axes, right-handed; a turn about z, the
-/// boresight, moves nothing in the middle of the image.
+/// Radial, along and cross are orbit axes of the first run: away from Mars, along the flight in inertial space, and along
+/// the angular momentum of the orbit. Rotations about the camera axes x, y and z are right-handed; a rotation about z, the
+/// boresight, does not move the middle of the image.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct ImageMovement {
-    /// Epoch of a line.
+    /// Change of the epoch of a line.
     pub time_s: Component,
     /// Distance between the perspective centres.
     pub distance_m: Size,
@@ -74,23 +74,23 @@ pub struct ImageMovement {
     pub radial_m: Component,
     /// Shift of the perspective centre along the flight.
     pub along_m: Component,
-    /// Shift of the perspective centre along the orbit's angular momentum.
+    /// Shift of the perspective centre along the angular momentum of the orbit.
     pub cross_m: Component,
-    /// Angle of the whole turn.
+    /// Angle of the total rotation.
     pub turn_arcsec: Size,
-    /// Turn about the camera's x axis.
+    /// Rotation about the camera's x axis.
     pub about_x_arcsec: Component,
-    /// Turn about the camera's y axis.
+    /// Rotation about the camera's y axis.
     pub about_y_arcsec: Component,
-    /// Turn about the boresight.
+    /// Rotation about the boresight.
     pub about_z_arcsec: Component,
-    /// Change of the boresight direction times its range: the displacement on the ground across the line of sight.
+    /// Change of the boresight direction times the range: the displacement on the ground across the line of sight.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pointing_ground_m: Option<Size>,
-    /// Distance between the points where the boresight meets the ellipsoid: position and turn together.
+    /// Distance between the intersections of both boresights with the ellipsoid: position and rotation together.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub boresight_ground_m: Option<Size>,
-    /// The samples, in order of lines.
+    /// Samples in the order of image lines.
     #[schemars(length(min = 1))]
     pub samples: Vec<SampleMovement>,
 }
@@ -98,33 +98,33 @@ pub struct ImageMovement {
 /// Movement of one sample; see [`ImageMovement`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct SampleMovement {
-    /// Lines from the middle of the header image.
+    /// Line offset from the middle of the header image, lines.
     pub line_offset: f64,
-    /// Epoch.
+    /// Change of the epoch.
     pub time_s: f64,
     /// Distance between the perspective centres.
     #[schemars(range(min = 0.0))]
     pub distance_m: f64,
-    /// Away from Mars.
+    /// Shift of the perspective centre away from Mars.
     pub radial_m: f64,
-    /// Along the flight.
+    /// Shift of the perspective centre along the flight.
     pub along_m: f64,
-    /// Along the orbit's angular momentum.
+    /// Shift of the perspective centre along the angular momentum of the orbit.
     pub cross_m: f64,
-    /// Angle of the whole turn.
+    /// Angle of the total rotation.
     #[schemars(range(min = 0.0))]
     pub turn_arcsec: f64,
-    /// About the camera's x axis.
+    /// Rotation about the camera's x axis.
     pub about_x_arcsec: f64,
-    /// About the camera's y axis.
+    /// Rotation about the camera's y axis.
     pub about_y_arcsec: f64,
-    /// About the boresight.
+    /// Rotation about the boresight.
     pub about_z_arcsec: f64,
-    /// Change of the boresight direction times its range.
+    /// Change of the boresight direction times the range.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0))]
     pub pointing_ground_m: Option<f64>,
-    /// Distance between the boresight's ground points.
+    /// Distance between the ground points of both boresights.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0))]
     pub boresight_ground_m: Option<f64>,

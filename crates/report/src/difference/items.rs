@@ -6,7 +6,7 @@ use serde::Serialize;
 use areograph_base::body::Body;
 use areograph_store::manifest::Manifest;
 
-/// A named thing.
+/// A named item.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Item {
     /// Name; repeated names are numbered `name (2)` and so on.
@@ -14,12 +14,12 @@ pub struct Item {
     /// Role of a kernel.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub role: Option<String>,
-    /// BLAKE3 of the file, or the fingerprint of the stage.
+    /// BLAKE3 hash of the file, or fingerprint of the stage.
     #[schemars(regex(pattern = "^[0-9a-f]{64}$"))]
     pub hash: String,
 }
 
-/// A thing in both runs that differs.
+/// An item in both runs that differs.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct ChangedItem {
     /// Name.
@@ -35,18 +35,18 @@ pub struct ChangedItem {
     pub b: String,
 }
 
-/// Differences between two lists of things.
+/// Differences between two lists of items.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Items {
-    /// Only in the second run.
+    /// Items only in the second run.
     pub added: Vec<Item>,
-    /// Only in the first run.
+    /// Items only in the first run.
     pub removed: Vec<Item>,
-    /// In both, with different hashes.
+    /// Items in both runs with different hashes.
     pub changed: Vec<ChangedItem>,
-    /// Number that are the same in both.
+    /// Number of items that are the same in both runs.
     pub unchanged: usize,
-    /// Whether items of both runs are in a different order: of kernels with the same data, the last one wins.
+    /// Whether the order of the common items differs: of kernels with the same data, the last takes precedence.
     pub reordered: bool,
 }
 

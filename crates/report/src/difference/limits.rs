@@ -8,11 +8,11 @@ use super::{Outcome, RunDifference, images::ImageDifference, movement::ROUNDING,
 /// Limits of movements; a missing limit allows any movement.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Limits {
-    /// For footprints, perspective centres and the boresight's ground points, metres.
+    /// Limit for footprints, perspective centres and the boresight's ground points, metres.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0))]
     pub movement_m: Option<f64>,
-    /// For the camera's turn, arcseconds.
+    /// Limit for the rotation of the camera, arcseconds.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0))]
     pub pointing_arcsec: Option<f64>,

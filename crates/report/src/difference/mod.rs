@@ -44,7 +44,7 @@ pub use words::quantity;
 
 use error::DifferenceError;
 
-/// Everything that differs between two runs of one site.
+/// All differences between two runs of one site.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct RunDifference {
     /// Always `areograph difference 1`.
@@ -54,7 +54,7 @@ pub struct RunDifference {
     pub site: String,
     /// Outcome, in one word.
     pub outcome: Outcome,
-    /// Limits that were applied to movements.
+    /// Limits applied to the movements.
     pub limits: Limits,
     /// Movements beyond the limits, and limits that could not be applied, one sentence each.
     pub beyond_limits: Vec<String>,
@@ -64,31 +64,31 @@ pub struct RunDifference {
     pub b: RunEntry,
     /// Kernels by name.
     pub kernels: Items,
-    /// Whether configuration keys or values differ, by the hashes of both.
+    /// Whether configuration keys or values differ, according to the configuration hashes.
     pub configuration_changed: bool,
-    /// Configuration keys whose values differ, as written.
+    /// Configuration keys with different values, as written.
     pub configuration: Vec<Change>,
     /// Time corrections that differ.
     pub biases: Vec<Change>,
     /// Counts that differ.
     pub counts: Vec<Change>,
-    /// Largest figures of the site that differ.
+    /// Differing figures of the site; each figure is the largest of its kind.
     pub figures: Vec<Change>,
-    /// Rejected shots by reason, that differ.
+    /// Numbers of rejected shots that differ, by reason.
     pub rejected: Vec<Change>,
-    /// Problems in the input of one run only; manifests quote the first ones.
+    /// Input problems of one run only; manifests quote only the first problems.
     pub complaints: Texts,
-    /// Notes of one run only; without notes on kernels named by a list, which the kernels show.
+    /// Notes of one run only, without notes on kernels named by a list, which `kernels` contains.
     pub notes: Texts,
-    /// Stages by their fingerprints: of their inputs, not their outputs.
+    /// Stages by fingerprint, which depends on the inputs of a stage, not on the outputs.
     pub stages: Items,
     /// Product files by content.
     pub products: Items,
     /// Range statistics of every profile.
     pub profiles: Vec<ProfileDifference>,
-    /// Places at which shots hit the ground.
+    /// Differences of the footprints.
     pub footprints: FootprintsDifference,
-    /// Orientation of every image from the kernels, then the adjusted orientations.
+    /// Orientations of all images from the kernels, followed by the adjusted orientations.
     pub images: Vec<ImageDifference>,
     /// Some of the adjusted tie points that both runs have.
     #[serde(skip)]
@@ -101,27 +101,27 @@ pub struct RunDifference {
 pub enum Outcome {
     /// Manifests are equal except for the time of publication.
     NothingChanged,
-    /// Something changed, but no footprint, position or pointing; images may be sampled at other lines.
+    /// Manifests differ, but no footprint, position or pointing moved; images may be sampled at different lines.
     NothingMoved,
-    /// Footprints, positions or pointing moved; or footprints or images are in one run only.
+    /// Footprints, positions or pointing moved, or footprints or images are in one run only.
     Moved,
-    /// Something moved farther than a limit allows, or a limit could not be applied.
+    /// A movement exceeds a limit, or a limit could not be applied.
     BeyondLimit,
 }
 
-/// A run, by its manifest.
+/// A run as described in the manifest.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct RunEntry {
     /// Version of the program.
     pub version: String,
-    /// When the products were published.
+    /// Time of publication of the products.
     pub finished_utc: String,
     /// Configuration file, without folders.
     pub configuration: String,
-    /// BLAKE3 of its keys and values.
+    /// BLAKE3 hash of the configuration keys and values.
     #[schemars(regex(pattern = "^[0-9a-f]{64}$"))]
     pub configuration_blake3: String,
-    /// Whether the products keep the limits of the configuration, and which are exceeded.
+    /// Whether the products are within the limits of the configuration, and the limits that they exceed.
     pub verdict: Verdict,
 }
 
@@ -137,17 +137,17 @@ impl RunEntry {
     }
 }
 
-/// A profile in both runs or in one.
+/// A profile in one or both runs.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct ProfileDifference {
     /// Window, orbit and crossing.
     pub profile: String,
-    /// Whether anything in it differs.
+    /// Whether any value of the profile differs.
     pub changed: bool,
-    /// In the first run.
+    /// Values in the first run.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub a: Option<ProfileDocument>,
-    /// In the second run.
+    /// Values in the second run.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub b: Option<ProfileDocument>,
 }

@@ -11,7 +11,7 @@ use areograph_geom::statistics::largest;
 /// 1e-8 s; no SPICE kernel is good to a micrometre.
 pub(super) const ROUNDING: f64 = 1e-6;
 
-/// Statistics of sizes, none negative; the unit is in the member's name.
+/// Statistics of non-negative sizes; the name of the member ends in the unit.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Size {
     /// Mean.
@@ -22,7 +22,7 @@ pub struct Size {
     pub max: f64,
 }
 
-/// Statistics of values with a sign; the unit is in the member's name.
+/// Statistics of signed values; the name of the member ends in the unit.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Component {
     /// Mean.

@@ -371,7 +371,7 @@ fn image_sentence(image: &ImageDifference) -> String {
         return match (image.valid_in_a, image.valid_in_b) {
             (Some(_), None) => format!("image {name}: only in A"),
             (None, _) => format!("image {name}: only in B"),
-            _ => format!("image {name}: no sample at the same line in both"),
+            _ => format!("image {name}: no sample at the same line in both runs"),
         };
     };
     let mut sentences = Vec::new();
@@ -401,14 +401,14 @@ fn image_sentence(image: &ImageDifference) -> String {
     });
     if let Some(ground_m) = movement.boresight_ground_m.filter(Size::moved) {
         sentences.push(format!(
-            "boresight on the ground by {} m on average, up to {} m",
+            "boresight moved on the ground by {} m on average, up to {} m",
             quantity(ground_m.mean),
             quantity(ground_m.max)
         ));
     }
     if movement.time_s.moved() {
         let times = signed(movement.time_s, "s");
-        sentences.push(format!("lines at other times, by {times}"));
+        sentences.push(format!("line times differ by {times}"));
     }
     let (a, b) = (image.samples_only_in_a, image.samples_only_in_b);
     sentences.extend(unmatched(a, b, " samples"));

@@ -18,7 +18,7 @@ pub(super) fn boresight(adjusted: &Adjusted) -> Markup {
         None => Markup::default(),
         Some(Err(reason)) => paragraph(&format!("adjustment.common_bus has no effect: {reason}.")),
         Some(Ok(found)) => {
-            let caption = "Recorded profiles against their positions by laser and images, metres";
+            let caption = "Recorded profiles minus their positions from laser and images, metres";
             html! { (words(found)) (table(&found.images)) (profiles(caption, &found.profile_shifts)) }
         }
     }
@@ -37,8 +37,9 @@ fn words(found: &BoresightSummary) -> Markup {
         )
     });
     paragraph(&format!(
-        "Camera and laser share a bus: in a simultaneous image the mounting places each shot, independent of the attitude \
-         (adjustment.common_bus). The laser points {} towards X and {} towards Y of the bus from its nominal direction.{}",
+        "Camera and laser share a bus: in a simultaneous image, the mounting determines the spot of each shot, \
+         independent of the attitude (adjustment.common_bus). The laser direction differs from the nominal direction by {} \
+         towards X and {} towards Y of the bus.{}",
         angle(0),
         angle(1),
         farthest.unwrap_or_default()
@@ -47,7 +48,7 @@ fn words(found: &BoresightSummary) -> Markup {
 
 fn table(images: &[SpotsOfImage]) -> Markup {
     let mut table = Table::new(
-        "Shots in simultaneous images: footprints from the kernels minus laser positions from the mounting",
+        "Shots in simultaneous images: footprints from the kernels minus spots from the mounting",
         &[
             Column::Text("image"),
             Column::Number("shots"),

@@ -117,8 +117,8 @@ fn words(geometric: &GeometricProducts, altimeter: &str, points_shown: usize) ->
         String::new()
     };
     format!(
-        "Tie points above the ellipsoid, south to north; below, above the {altimeter} surface: {medians}. Grey: surface ± 1 σ \
-         (median {} m).{thinned}",
+        "Top: heights of tie points above the ellipsoid, south to north. Bottom: heights above the {altimeter} surface, \
+         {medians}. Grey: surface ± 1 σ (median {} m).{thinned}",
         label(Summary::of(&sigmas).median, 1)
     )
 }

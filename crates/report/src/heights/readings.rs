@@ -85,7 +85,7 @@ fn reading(clock_s: Option<(f64, f64)>, is_withheld: bool) -> String {
                 format!(" ± {}", label(sigma_s, 2))
             };
             let offset = label(offset_s, 2);
-            format!("by an offset of the attitude clock of {offset}{sigma} s")
+            format!("attitude clock offset of {offset}{sigma} s")
         },
     )
 }

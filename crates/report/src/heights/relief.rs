@@ -24,9 +24,9 @@ pub(super) fn relief(adjusted: &Adjusted, beforehand: &str) -> Markup {
     let [east_m, north_m] = relief.sigma_m;
     let axes = format!("±{} m E, ±{} m N", label(east_m, 0), label(north_m, 0));
     if relief.used {
-        let caption = "Recorded profiles against their positions by relief and images, metres";
+        let caption = "Recorded profiles minus their positions from relief and images, metres";
         return html! {
-            p { "Relief alone determines the position to " (axes) "; it is used (adjustment.relief_for_plan)." }
+            p { "Relief alone determines the position to " (axes) "; relief is used (adjustment.relief_for_plan)." }
             (profiles(caption, &relief.profile_shifts))
         };
     }
@@ -39,7 +39,7 @@ pub(super) fn relief(adjusted: &Adjusted, beforehand: &str) -> Markup {
         "no better than"
     };
     paragraph(&format!(
-        "Relief alone would determine the position to {axes}, {than} {beforehand}; it is not used \
+        "Relief alone would determine the position to {axes}, {than} {beforehand}; relief is not used \
          (adjustment.relief_for_plan)."
     ))
 }

@@ -44,8 +44,8 @@ pub(super) fn pictures(of: &LaserMatch) -> Result<Markup> {
         (words(of, first.surface))
         (definitions(first.surface))
         (bar()?)
-        (figure("Units that are kept", &kept)?)
-        (figure("Units that are not kept", &refused)?)
+        (figure("Kept units", &kept)?)
+        (figure("Rejected units", &refused)?)
     })
 }
 
@@ -104,13 +104,13 @@ impl<'a> Shown<'a> {
 fn words(of: &LaserMatch, surface: &SimilaritySurface) -> Markup {
     let pixels = match surface.step_cells {
         1 => String::new(),
-        step => format!(" A pixel is the best of {step} by {step} shifts."),
+        step => format!(" A pixel shows the best of {step} by {step} shifts."),
     };
     paragraph(&format!(
-        "Similarity of the heights of model and laser at every shift ({}), in cells, east to the right and north up. \
+        "Similarity of model and laser heights at every shift ({}), in cells; east is to the right, north is up. \
          A reliable match has one sharp peak. Shots on parallel passes produce a ridge, along which the shift is not \
-         determined. The best of several peaks of equal height is best by chance only.{pixels} Shifts without a \
-         colour have heights for too few shots.",
+         determined. The best of several equally high peaks is best by chance only.{pixels} Shifts without a \
+         colour have model heights for too few shots.",
         of.similarity.word()
     ))
 }
@@ -183,7 +183,7 @@ fn figure(title: &str, shown: &[&Shown]) -> Result<Markup> {
         return Ok(Markup::default());
     }
     let caption = format!(
-        "Similarity over the shifts of {}, with the best shift, cells east and north.",
+        "Similarity over the shifts of {}; best shift in cells, east and north.",
         counted(shown.len(), "unit")
     );
     Ok(html! {

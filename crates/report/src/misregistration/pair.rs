@@ -77,8 +77,8 @@ impl<'a> BeforeAfter<'a> {
         html! {
             @if all > PAIRS_TABLED {
                 p {
-                    "Rows are of the " (PAIRS_TABLED) " of " (whole(all))
-                    " pairs with the largest along-track parallax; adjustment.json has all."
+                    "Rows show the " (PAIRS_TABLED) " of " (whole(all))
+                    " pairs with the largest along-track parallax; adjustment.json contains all pairs."
                 }
             }
         }
@@ -140,7 +140,7 @@ impl<'a> BeforeAfter<'a> {
             );
         }
         let after = after.map_or_else(
-            || "after it no tie point joins them".to_owned(),
+            || "after it, no tie point joins the images".to_owned(),
             |after| format!("{} after it", after.in_words()),
         );
         format!(

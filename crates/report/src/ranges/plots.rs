@@ -77,7 +77,7 @@ fn all_profiles(site: &SiteProducts) -> Plot {
         ..Panel::of("range − distance, m", series)
     };
     let caption = format!(
-        "{} profiles in their order in the tables, means from {} to {} m. The {WORST} largest are shown separately.",
+        "{} profiles in the order of the tables, means from {} to {} m. The {WORST} largest are shown separately.",
         whole(site.profiles.len()),
         metres(extreme(site, f64::min)),
         metres(extreme(site, f64::max))
@@ -112,7 +112,7 @@ fn profile_plot(site: &SiteProducts, index: usize, limit: usize) -> Plot {
     }
     if !shots.outliers.is_empty() {
         panel.series.push(Series {
-            label: "outliers; those beyond the axes are drawn at the edge".to_owned(),
+            label: "outliers (beyond the axes: drawn at the edge)".to_owned(),
             style: Style::Crosses,
             colour: 0,
             points: thinned(&shots.outliers, limit),

@@ -134,7 +134,7 @@ impl<'a> Rendering<'a> {
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "clamped to a byte just before"
+        reason = "clamped to the range of a byte before"
     )]
     fn read_out(&self, dn: f64, line: u32, sample: u32) -> u8 {
         let pixel = mix(self.keys[1] ^ (u64::from(line) << 32 | u64::from(sample)));

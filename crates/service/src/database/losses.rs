@@ -51,8 +51,8 @@ impl Loss {
     #[must_use]
     pub fn words(&self) -> String {
         format!(
-            "the database was rebuilt from the products on {}: {}, {}. Tokens, sessions, jobs, nights, events, pins and audit \
-             records from before are lost; create new tokens with `areograph service token add`",
+            "the database was rebuilt from the products on {}: {}, {}. Earlier tokens, sessions, jobs, nights, events, pins and \
+             audit records are lost; create new tokens with `areograph service token add`",
             utc_text(self.at_ms),
             counted(self.sites, "site"),
             counted(self.runs, "run"),

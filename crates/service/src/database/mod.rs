@@ -55,7 +55,7 @@ pub struct Database {
 #[derive(Debug, thiserror::Error, Cause)]
 pub enum DatabaseError {
     /// An error of SQLite.
-    #[error("the database of the service: {}", plain(.0))]
+    #[error("the database of the service failed: {}", plain(.0))]
     #[cause(Io: "check the disk and the permissions of the state folder")]
     Sqlite(#[source] rusqlite::Error),
     /// Another program holds a lock.
@@ -63,12 +63,12 @@ pub enum DatabaseError {
     #[cause(Io: "close the program that uses the database, and start again")]
     Locked,
     /// There is no database.
-    #[error("the state folder has no database")]
-    #[cause(Configuration: "start the service once, which creates it")]
+    #[error("the state folder contains no database")]
+    #[cause(Configuration: "start the service once to create it")]
     Missing,
     /// Something that is not a file has its name.
     #[error("not a regular file; expected the database of the service")]
-    #[cause(Input: "run areograph service rebuild, which moves this entry aside and creates a database from the products")]
+    #[cause(Input: "run `areograph service rebuild`, which moves this entry aside and creates a database from the products")]
     NotAFile,
     /// A database without the tables or the layout of the service.
     #[error("not a database of the service: {0}")]
@@ -76,8 +76,8 @@ pub enum DatabaseError {
     Foreign(String),
     /// The file is damaged.
     #[error("the database is damaged: {0}")]
-    #[cause(Input: "put the newest copy from the folder copies in its place, or make a new one from the products: \
-        areograph service rebuild")]
+    #[cause(Input: "restore the newest copy from the folder `copies`, or rebuild the database from the products with \
+        `areograph service rebuild`")]
     Damaged(String),
     /// A newer areograph wrote it.
     #[error("the database has layout {found}; this areograph supports layouts up to {VERSION}")]

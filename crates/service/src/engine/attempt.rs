@@ -304,7 +304,7 @@ fn told(noted: Stored<()>, attempt: &Attempt) {
     if let Err(error) = noted {
         tracing::warn!(
             job = attempt.job,
-            "a line of a worker could not be recorded: {error}"
+            "a line from a worker could not be recorded: {error}"
         );
     }
 }

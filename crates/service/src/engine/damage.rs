@@ -151,7 +151,7 @@ pub fn check_run(
 ) -> Option<RunCheck> {
     let mut check = RunCheck::default();
     let Some(manifest) = published_manifest(folder, manifest_blake3) else {
-        check.add("the manifest of this run is not the one that was published".to_owned());
+        check.add("the manifest of this run differs from the published manifest".to_owned());
         return Some(check);
     };
     for entry in &manifest.products {

@@ -86,7 +86,7 @@ async fn fetch<W: Workers>(core: &Core<W>) -> Stored<()> {
                 &alert(AlertKind::FetchFailed, &text),
                 Some(&alert(
                     AlertKind::Recovered,
-                    "archive files are fetched again",
+                    "archive files are being fetched again",
                 )),
             ),
         )

@@ -52,7 +52,7 @@ pub fn read_list(
     if whole {
         return Ok(files);
     }
-    Err("the list of its files is incomplete".to_owned())
+    Err("the file list of the folder is incomplete".to_owned())
 }
 
 /// Whether a file is an input: site files are directly in their folder, and rsync and others give unfinished files

@@ -318,7 +318,7 @@ impl Context<'_> {
             ),
             _ => (
                 CauseKind::RetryOf,
-                "an earlier job ended without products of these inputs",
+                "an earlier job ended without products from these inputs",
             ),
         })
     }

@@ -98,8 +98,8 @@ fn unavailable<'a>(poll: &Poll<'a>) -> Result<&'a BTreeMap<String, Identity>, St
     let lost = poll.known.values().filter(is_lost).count();
     if lost as f64 > poll.max_loss * known as f64 {
         return Err(format!(
-            "{lost} of {known} files are missing, more than changes.max_loss = {} allows; if the files were removed intentionally, raise it until the \
-             next poll",
+            "{lost} of {known} files are missing, more than changes.max_loss = {} allows; if the files were removed \
+             intentionally, raise this limit until the next poll",
             poll.max_loss
         ));
     }

@@ -105,7 +105,7 @@ fn after_crash(attempt: &Fruitless<'_>, random: Random) -> (JobState, Moved) {
     let rss_mib = attempt.ended.rss_peak_kib as f64 / 1024.0;
     if rss_mib > MEMORY_SHARE * f64::from(attempt.memory_mib) {
         let text = format!(
-            "the worker needs more memory than workers.memory_mib = {} at stage {stage}",
+            "the worker needs more memory than workers.memory_mib = {} allows at stage {stage}",
             attempt.memory_mib
         );
         let outcome = json!({ "text": text, "stage": attempt.stage, "rss_mib": rss_mib });
@@ -171,7 +171,7 @@ fn ended(state: JobState, text: &str) -> (JobState, Moved) {
 #[must_use]
 #[allow(
     clippy::cast_possible_truncation,
-    reason = "a number that is too large becomes the largest"
+    reason = "a number that is too large becomes the maximum"
 )]
 pub fn milliseconds(seconds: f64) -> i64 {
     (seconds * 1000.0).round() as i64

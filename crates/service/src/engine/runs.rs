@@ -42,7 +42,7 @@ pub struct Published {
 /// The folder contains another run than expected.
 #[derive(Debug, thiserror::Error, Cause)]
 #[error(
-    "the run is {run} of job {job}, attempt {attempt}; expected the run with the name of the folder"
+    "the folder contains run {run} of job {job}, attempt {attempt}; expected the run with the name of the folder"
 )]
 #[cause(Input: "move the folder away; the service then runs the site again")]
 struct Foreign {
@@ -54,7 +54,7 @@ struct Foreign {
 /// The folder of a site contains a run of another one, as after a copy of that site's folder.
 #[derive(Debug, thiserror::Error, Cause)]
 #[error("the manifest names site {found}; expected {expected}, the site of the folder")]
-#[cause(Input: "move the folder of the run back below the folder of its site, or away")]
+#[cause(Input: "move the run folder back to the folder of its site, or elsewhere")]
 struct OtherSite {
     found: String,
     expected: String,
@@ -62,8 +62,8 @@ struct OtherSite {
 
 /// A manifest that differs from the one that was published.
 #[derive(Debug, thiserror::Error, Cause)]
-#[error("the manifest is not the one that was published")]
-#[cause(Input: "restore the manifest from a copy, or move the folder of the run away")]
+#[error("the manifest differs from the published manifest")]
+#[cause(Input: "restore the manifest from a copy, or move the run folder elsewhere")]
 struct Altered;
 
 /// Reads a run of a site and checks every product against its manifest.

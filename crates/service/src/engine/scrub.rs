@@ -138,7 +138,7 @@ pub async fn scrub_runs<W: Workers>(core: &Arc<Core<W>>) -> Stored<()> {
     };
     if !products_are_there(core) {
         tracing::warn!(
-            "{} is not the folder of products of this service: the check of products is omitted",
+            "{} is not the products folder of this service: the product check is omitted",
             core.shared.config().outputs.products.display()
         );
         return Ok(());

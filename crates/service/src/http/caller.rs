@@ -131,7 +131,7 @@ fn refused(app: &App, text: &str, remote: IpAddr) -> Problem {
             retry_after_s: Some(wait_s),
             ..Problem::new(
                 StatusCode::TOO_MANY_REQUESTS,
-                "Too many wrong tokens came from this address, or for this token. Try again later.",
+                "Too many invalid attempts came from this address, or with this token. Try again later.",
             )
         };
     }
@@ -194,7 +194,7 @@ fn caller(parts: &Parts) -> Result<Caller, Problem> {
 fn unknown() -> Problem {
     Problem::new(
         StatusCode::UNAUTHORIZED,
-        "This request needs a token: send the header Authorization: Bearer areo_…",
+        "This request requires a token: send the header Authorization: Bearer areo_…",
     )
 }
 

@@ -99,7 +99,7 @@ pub(super) async fn cancel(app: &Arc<App>, caller: Caller, id: i64) -> Result<Jo
         None => Err(no_job()),
         Some((job, true)) => Ok(job),
         Some((job, false)) => Err(Problem::conflict(format!(
-            "Job {id} has ended: it is {}.",
+            "Job {id} has ended with the state {}.",
             job.state
         ))),
     }

@@ -52,7 +52,7 @@ pub(super) fn difference(products: &Path, run: &Run) -> Result<Vec<u8>, Problem>
         .join(format!("{}.html", run.id));
     let file = open_below(products, &path).map_err(Problem::internal)?;
     let file =
-        file.ok_or_else(|| Problem::not_found("This run has not been compared with another one."))?;
+        file.ok_or_else(|| Problem::not_found("This run has not been compared with another run."))?;
     let mut page = Vec::new();
     file.take(MANIFEST_MAX)
         .read_to_end(&mut page)
@@ -105,7 +105,7 @@ fn manifest_bytes(products: &Path, run: &Run) -> Result<Vec<u8>, Withheld> {
     let mut bytes = Vec::new();
     file.take(MANIFEST_MAX).read_to_end(&mut bytes)?;
     if blake3::hash(&bytes).to_hex().as_str() != run.manifest_blake3 {
-        let what = "the manifest of this run is not the one that was published";
+        let what = "the manifest of this run differs from the published manifest";
         return Err(Withheld::Damaged(what.to_owned()));
     }
     Ok(bytes)
@@ -195,9 +195,9 @@ fn open_product(
     } else {
         let listed = read_manifest(products, run)?.products.into_iter();
         let mut named = listed.filter(|entry| entry.path == path);
-        named
-            .next()
-            .ok_or_else(|| Problem::not_found("The manifest of this run lists no such product."))?
+        named.next().ok_or_else(|| {
+            Problem::not_found("The manifest of this run does not list this product.")
+        })?
     };
     let damaged = || Withheld::Damaged(format!("`{}` does not match its manifest", entry.path));
     let file = open_below(products, &run_folder(run).join(&entry.path))?.ok_or_else(damaged)?;

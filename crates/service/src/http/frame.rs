@@ -86,7 +86,10 @@ fn says_itself(response: &Response) -> bool {
 }
 
 /// A panic is a bug in areograph; its text goes to the log.
-#[allow(clippy::needless_pass_by_value, reason = "as the layer calls it")]
+#[allow(
+    clippy::needless_pass_by_value,
+    reason = "the layer requires this signature"
+)]
 pub(super) fn panicked(panic: Box<dyn Any + Send>) -> Response {
     let text = panic
         .downcast_ref::<String>()
@@ -154,7 +157,7 @@ fn usual_detail(status: StatusCode) -> &'static str {
     match status {
         StatusCode::NOT_FOUND => "This address does not exist.",
         StatusCode::METHOD_NOT_ALLOWED => {
-            "This address does not accept this method; the header Allow lists those accepted."
+            "This address does not accept this method; the Allow header lists the accepted methods."
         }
         StatusCode::FORBIDDEN => "This request came from a page of another site.",
         _ => "The request was refused.",

@@ -76,7 +76,7 @@ fn check_host(app: &App, headers: &HeaderMap, uri: &Uri) -> Result<bool, Problem
     let wrong = || {
         Problem::new(
             StatusCode::MISDIRECTED_REQUEST,
-            "The service does not answer for this host. Use its own address, or the public_url of its configuration.",
+            "The service does not accept this host. Use the address of the service, or the public_url of its configuration.",
         )
     };
     let mut hosts = headers.get_all(header::HOST).iter();
@@ -115,7 +115,7 @@ fn is_local_name(host: &str, local: SocketAddr) -> bool {
 fn refuse_token_in(uri: &Uri) -> Result<(), Problem> {
     let refused = || {
         Problem::bad_request(
-            "A token must not appear in an address, where logs and histories keep it: send the header Authorization: \
+            "A token must not appear in an address, which logs and histories record: send the header Authorization: \
              Bearer … instead. If this was a real token, revoke it.",
         )
     };

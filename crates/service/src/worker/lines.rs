@@ -17,7 +17,7 @@ pub(super) enum Garbled {
     #[error("not a line of a worker: {0}")]
     NoLine(serde_json::Error),
     /// The pipe broke.
-    #[error("its lines cannot be read: {0}")]
+    #[error("the lines cannot be read: {0}")]
     Io(#[from] std::io::Error),
 }
 

@@ -382,8 +382,8 @@ fn out_of_memory(memory_mib: u32) -> Failure {
         stage: None,
         file: None,
         text: format!(
-            "the worker needs more memory than workers.memory_mib = {memory_mib} allows; raise it, and restart or reload the \
-             service"
+            "the worker needs more memory than workers.memory_mib = {memory_mib} allows; raise this limit, and restart or reload \
+             the service"
         ),
     }
 }

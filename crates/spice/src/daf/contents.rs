@@ -39,7 +39,7 @@ pub(super) fn check(
     };
     if layout.words() != words {
         return Err(format!(
-            "{words} words, of which its counts account for {}",
+            "{words} words; its counts account for {} words",
             layout.words()
         )
         .into());
@@ -112,7 +112,7 @@ fn check_lists(reader: &mut Reader, layout: &Layout, mut first_word: u64) -> Res
                         return Ok(());
                     }
                     Err(format!(
-                        "entry {} of the directory of times is {:?}; the time is {:?}",
+                        "entry {} of the time directory is {:?}; expected the time {:?}",
                         index + 1,
                         entry[0],
                         listed.unwrap_or(f64::NAN)
@@ -142,7 +142,7 @@ fn check_packet(packet: Packet, index: usize, words: &[f64]) -> Result<(), Strin
                 return Ok(());
             }
             Err(format!(
-                "record {} is for {:?} s about {:?}; expected {:?} s about {middle_s:?}",
+                "record {} covers {:?} s about {:?}; expected {:?} s about {middle_s:?}",
                 index + 1,
                 2.0 * words[1],
                 words[0],
@@ -154,7 +154,10 @@ fn check_packet(packet: Packet, index: usize, words: &[f64]) -> Result<(), Strin
             if (norm - 1.0).abs() <= NORM_TOLERANCE {
                 return Ok(());
             }
-            Err(format!("quaternion {} has a norm of {norm:?}", index + 1))
+            Err(format!(
+                "quaternion {} has a norm of {norm:?}; expected 1",
+                index + 1
+            ))
         }
     }
 }

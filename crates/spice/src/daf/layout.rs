@@ -157,7 +157,7 @@ pub(super) fn layout(
         (KernelRole::Ck, 5) => {
             let window = tail.count(3, "points of the window")?;
             if window > DEGREE_MAX + 1 {
-                return Err(format!("{window} points in the window of interpolation"));
+                return Err(format!("an interpolation window of {window} points"));
             }
             tail.positive(5, "rate of the clock")?;
             let size = tail.size_of_subtype(4, &[8, 4, 14, 7])?;
@@ -176,7 +176,10 @@ const fn before_last(times: usize) -> usize {
     times.saturating_sub(1) / DIRECTORY_STEP
 }
 
-#[allow(clippy::unnecessary_wraps, reason = "the form of all layouts")]
+#[allow(
+    clippy::unnecessary_wraps,
+    reason = "the same signature for all layouts"
+)]
 fn discrete(packet: Packet, packets: usize, entries: usize, tail: usize) -> Option<Layout> {
     Some(Layout {
         packets,
@@ -273,9 +276,12 @@ impl Tail<'_> {
     /// The word `place` words before the end, from 1.
     fn word_before_end(&self, place: usize) -> Result<f64, String> {
         let index = self.words.len().checked_sub(place);
-        index
-            .map(|index| self.words[index])
-            .ok_or_else(|| format!("{} words, too few for its type", self.segment))
+        index.map(|index| self.words[index]).ok_or_else(|| {
+            format!(
+                "{} words, too few for the type of the segment",
+                self.segment
+            )
+        })
     }
 
     /// A count: at least one, and no more than the segment has words.
@@ -285,7 +291,7 @@ impl Tail<'_> {
             .filter(|count| (1..=self.segment).contains(count))
             .ok_or_else(|| {
                 format!(
-                    "its number of {what} is {value:?}, of {} words",
+                    "its number of {what} is {value:?}, in a segment of {} words",
                     self.segment
                 )
             })
@@ -369,7 +375,10 @@ mod tests {
             spk(13, &[7.0, f64::NAN]),
             "its number of states is NaN, of 1000 words"
         );
-        assert_eq!(spk(13, &[7.0]), "1000 words, too few for its type");
+        assert_eq!(
+            spk(13, &[7.0]),
+            "1000 words, too few for the type of the segment"
+        );
         assert_eq!(
             spk(2, &[0.0, 60.0, 36.0, 10.0]),
             "records of 36 words for 3 components"

@@ -48,7 +48,7 @@ pub(super) fn check_norms(norms: &[f64]) -> Result<(), String> {
         let off = (norm - 0.5 * (low + high)).abs();
         if count >= 3 && off > NORM_STANDS_OUT && off > STANDS_OUT * (high - low) {
             return Err(format!(
-                "quaternion {} has a norm of {norm:?}, among others of {low:?}",
+                "quaternion {} has a norm of {norm:?}; others have a norm of {low:?}",
                 index + 1
             ));
         }
@@ -89,7 +89,7 @@ pub(super) fn check(reader: &mut Reader, states: &States) -> Result<(), Problem>
             if let Some((place, size)) = absurd(near) {
                 let record = first + middle - REACH + place + 1;
                 return Err(
-                    format!("record {record} holds {size:e}, unlike its neighbours").into(),
+                    format!("record {record} contains {size:e}, unlike its neighbours").into(),
                 );
             }
             if let Some(problem) = contradiction(near) {

@@ -33,9 +33,9 @@ pub fn accuracy_withheld<'a>(
     let assumed: Vec<&str> = assumed.map(|times| &*times.id).collect();
     (!assumed.is_empty()).then(|| {
         format!(
-            "adjustment.position_sigma_m and rotation_sigma_arcsec are the defaults, which describe orbit and attitude of {}, \
-             not of {}: absolute accuracies are withheld, and standard deviations in the products rest on these values; \
-             set both keys",
+            "adjustment.position_sigma_m and rotation_sigma_arcsec have their default values, which apply to the orbit \
+             and attitude of {}, not of {}: absolute accuracies are withheld, and standard deviations in the products \
+             depend on these values; set both keys",
             SPACECRAFT.full_name,
             assumed.join(", ")
         )

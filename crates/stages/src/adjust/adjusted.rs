@@ -41,7 +41,7 @@ pub struct Adjusted {
     /// Position of the tie points by the other reading of the along-track disagreement, or the reason why it is not
     /// determined; `None` where the disagreement is small.
     pub other_reading: Option<std::result::Result<OtherReading, String>>,
-    /// One entry for each image, in order.
+    /// Adjustment result of each image, in order.
     pub images: Vec<CorrectedImage>,
     /// Points with adjusted coordinates: shots, then tie points, each in order.
     pub points: Vec<CorrectedPoint>,
@@ -51,7 +51,7 @@ pub struct Adjusted {
     pub ranges: Vec<RangeResidual>,
     /// Rejected points.
     pub rejected: Vec<RejectedPoint>,
-    /// Weighted sum of squared residuals before each step and after the last.
+    /// Weighted sum of squared residuals before each step and after the last step.
     pub weighted_squares: Vec<f64>,
 }
 

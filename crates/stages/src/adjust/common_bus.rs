@@ -77,7 +77,7 @@ pub(super) fn add_spots<M: ExteriorOrientation>(
 ) -> Result<Result<(), String>, AdjustError> {
     if images.iter().any(|image| image.laser_axes.is_none()) {
         return Ok(Err(
-            "the altimeter file does not state where the beam points (beam.bus)".to_owned(),
+            "the altimeter file does not state the beam direction (beam.bus)".to_owned(),
         ));
     }
     let profile_of: BTreeMap<usize, usize> = assembled

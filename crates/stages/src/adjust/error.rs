@@ -11,8 +11,8 @@ pub(super) const CONTRADICTION: f64 = 10.0;
 #[cause(Input)]
 pub enum AdjustError {
     /// No tie point could be intersected.
-    #[error("none of {ties} tie points has a ground point; {first}")]
-    #[cause("check that the images overlap and that the tie points belong to them")]
+    #[error("none of the {ties} tie points has a ground point; {first}")]
+    #[cause("check that the images overlap and that the tie points belong to these images")]
     NoTies {
         /// Tie points.
         ties: usize,
@@ -22,7 +22,7 @@ pub enum AdjustError {
     /// A fault of the network.
     #[error("{0}")]
     #[cause(
-        "check the input of the adjustment, and give orientations and footprints finite standard deviations"
+        "check the adjustment input, and give orientations and footprints finite standard deviations"
     )]
     Network(BundleError),
     /// The steps do not converge.
@@ -30,8 +30,8 @@ pub enum AdjustError {
         "the adjustment did not converge after {steps} steps (weighted sum of squares {weighted_squares:.3e}) with {held_by}"
     )]
     #[cause(
-        "lower these standard deviations where they exceed the uncertainty of the kernels; otherwise check the tie \
-         points and the images' times and kernels: the observations have no common solution"
+        "reduce these standard deviations if they exceed the kernel uncertainty; otherwise check the tie points, image \
+         times and kernels: the observations have no common solution"
     )]
     NotConverged {
         /// Steps taken.
@@ -43,7 +43,7 @@ pub enum AdjustError {
     },
     /// An invalid standard deviation, coordinate or number.
     #[error("{what} is {value}, expected {expected}")]
-    #[cause("correct this value, or leave out the item that it belongs to")]
+    #[cause("correct this value, or omit the item to which it belongs")]
     Value {
         /// The quantity, with its image, point or profile.
         what: String,
@@ -55,15 +55,15 @@ pub enum AdjustError {
     /// The observations do not separate unknowns.
     #[error("the network is singular: the observations do not separate {0}")]
     #[cause(
-        "give these unknowns finite standard deviations in [adjustment], or smaller ones, or hold them fixed with 0"
+        "give these unknowns finite or smaller standard deviations in [adjustment], or fix them with 0"
     )]
     Singular(String),
     /// A shot occurs twice.
     #[error("two shots have the identifier {0}")]
-    #[cause("leave out the second file, or renumber the shots")]
+    #[cause("omit the second file, or renumber the shots")]
     DuplicateShot(String),
     /// An image that shows no ground according to its orientation.
-    #[error("image {image}: its orientation sees no ground: {unseen}")]
+    #[error("image {image} shows no ground according to its orientation: {unseen}")]
     #[cause("check the orientation samples of the image")]
     Blind {
         /// Identifier of the image.
@@ -75,9 +75,7 @@ pub enum AdjustError {
     #[error(
         "{what} contradicts the rest of the network: standardised residual {standardised:.1}, expected at most {CONTRADICTION}"
     )]
-    #[cause(
-        "check the datum, the clock and the units of this value, or raise its standard deviation"
-    )]
+    #[cause("check the datum, clock and units of this value, or increase its standard deviation")]
     Contradiction {
         /// The initial value.
         what: String,

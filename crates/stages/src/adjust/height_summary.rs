@@ -23,29 +23,30 @@ const CHANCE_ALL: usize = 2;
 /// Heights of tie points above the MOLA surface, as observations.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct HeightSummary {
-    /// Tie points whose height is observed.
+    /// Number of tie points with an observed height.
     pub ties: usize,
-    /// Shots of the surface.
+    /// Number of shots of the surface.
     pub shots: usize,
-    /// Profiles that they belong to.
+    /// Number of profiles to which these shots belong.
     pub profiles: usize,
     /// Root mean square difference of heights 300 m apart, metres.
     #[schemars(range(min = 0.0))]
     pub roughness_m: f64,
-    /// Whether the surface under these tie points and the weights of their heights converged; if not, both still
-    /// changed in the last of 15 rounds.
+    /// Whether the surface under the tie points and the weights of their heights converged; if not, both still changed
+    /// in the last of 15 rounds.
     pub settled: bool,
-    /// Adjusted heights above the surface, metres.
+    /// Statistics of adjusted heights above the surface, metres.
     pub above_m: Summary,
-    /// Tie points that are compared with the surface, and those of them farther from it than 3.29 of their own standard
-    /// deviations: a few are craters between the profiles, more are measurement errors across the track.
+    /// Number of tie points that are compared with the surface; `beyond_limit` of these points are farther from the
+    /// surface than 3.29 of their own standard deviations: a few are craters between the profiles, more are measurement
+    /// errors across the track.
     pub compared: usize,
-    /// See `compared`.
+    /// Number of compared tie points that are farther from the surface than 3.29 of their own standard deviations.
     pub beyond_limit: usize,
-    /// Tie points that were rejected for their height; they are not among the compared ones.
+    /// Number of tie points that were rejected for their height; `compared` does not include these points.
     pub rejected: usize,
-    /// Standard deviations of the mean of these points in east, north and height, metres: their common errors and,
-    /// upwards, the shift of the mean by those beyond the limit, some of which may err.
+    /// Standard deviations of the mean of the tie points in east, north and height, metres: their common errors and, in
+    /// height, the shift of the mean by points beyond the limit, some of which may be in error.
     #[schemars(transform = none_negative)]
     pub mean_sigma_m: [f64; 3],
 }

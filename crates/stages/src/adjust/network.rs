@@ -166,7 +166,7 @@ fn known_coordinates(
         return Ok(KnownCoordinates::of_sigmas(Vector3::repeat(FIXED_M)));
     };
     KnownCoordinates::of_covariance(covariance_m2).map_err(|least_m2| AdjustError::Value {
-        what: format!("the least eigenvalue of the covariance matrix of tie point {id}, m²,"),
+        what: format!("the smallest eigenvalue of the covariance matrix of tie point {id}, m²,"),
         value: least_m2,
         expected: "a positive number",
     })

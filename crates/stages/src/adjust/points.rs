@@ -47,7 +47,7 @@ pub enum RejectionReason {
         standardised: f64,
     },
     /// Its height is implausible.
-    #[error("{} m from the laser surface, standardised {standardised:.1}", signed(*above_m, 0))]
+    #[error("{} m above the laser surface, {standardised:.1} standard deviations", signed(*above_m, 0))]
     Height {
         /// Height above the surface without the part that tie points share, metres.
         above_m: f64,

@@ -7,27 +7,27 @@ use super::network::Assembled;
 use areograph_base::schema::none_negative;
 use areograph_geom::bundle::Adjustment;
 
-/// Horizontal position from relief, whether or not the adjustment uses it.
+/// Horizontal position from relief, whether or not the adjustment uses relief.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ReliefSummary {
     /// Whether heights on slopes were used for the horizontal position.
     pub used: bool,
-    /// Standard deviations in east and north of the images' position against the MOLA surface from relief only,
-    /// metres.
+    /// Standard deviations of the position of the images relative to the MOLA surface, from relief only, east and
+    /// north, metres.
     #[schemars(transform = none_negative)]
     pub sigma_m: [f64; 2],
-    /// Where it is used: offset of each profile of the surface as recorded.
+    /// If relief is used: offset of the recorded from the true position of each profile of the surface.
     pub profile_shifts: Vec<ProfileOffset>,
 }
 
-/// Offset of a profile as recorded.
+/// Offset of the recorded from the true position of a profile.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ProfileOffset {
     /// Identifier of the profile.
     pub profile: String,
-    /// Towards east, north and up, metres.
+    /// Offset in east, north and height, metres.
     pub shift_m: [f64; 3],
-    /// Standard deviations of these, metres.
+    /// Standard deviations of the offset in east, north and height, metres.
     #[schemars(transform = none_negative)]
     pub sigma_m: [f64; 3],
 }

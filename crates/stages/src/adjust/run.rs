@@ -131,7 +131,7 @@ fn contradictions<M>(
         for prior in outcome.iter().filter_map(|point| point.priors).flatten() {
             let owner = match kind {
                 PointKind::Shot => "the footprint of shot",
-                PointKind::Tie => "the given place of tie point",
+                PointKind::Tie => "the given position of tie point",
             };
             refuse(format!("{owner} {}", point.name), size(&prior))?;
         }

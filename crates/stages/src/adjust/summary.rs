@@ -48,10 +48,10 @@ pub enum ObservationType {
     MolaGround,
     /// Given coordinates of tie points.
     TieGround,
-    /// Time and range biases, the offset of the attitude clock, and the boresight angles, profile shifts and line times
-    /// of a laser on the same bus; initially 0.
+    /// Time and range biases, the attitude clock offset and, for a laser on the same bus, boresight angles, profile
+    /// shifts and line times; all are initially 0.
     Bias,
-    /// Positions of the laser in simultaneous images, from the mounting.
+    /// Laser spots in simultaneous images, computed from the mounting.
     LaserSpot,
 }
 
@@ -81,21 +81,21 @@ pub struct TypeSummary {
     pub kind: ObservationType,
     /// Scalar observations.
     pub observations: usize,
-    /// Sum of their redundancy numbers.
+    /// Sum of the redundancy numbers of these observations.
     #[schemars(range(min = 0.0))]
     pub redundancy: f64,
-    /// Their part of the weighted sum of squares.
+    /// Part of the weighted sum of squares from these observations.
     #[schemars(range(min = 0.0))]
     pub weighted_squares: f64,
-    /// `sqrt(weighted squares / redundancy)`: near 1 when their standard deviations are right; 0 without
-    /// redundancy.
+    /// `sqrt(weighted squares / redundancy)`: near 1 if the standard deviations are correct; 0 without redundancy.
     #[schemars(range(min = 0.0))]
     pub variance_component: f64,
-    /// Interval that holds 99 % of such values when the standard deviations are right, from the χ² distribution; 0
-    /// where the redundancy is below 1. With robust weights or overestimated roughness, the value for heights is below it.
+    /// Interval that contains 99 % of the values of `variance_component` if the standard deviations are correct, from the
+    /// χ² distribution; 0 if the redundancy is below 1. With robust weights or overestimated roughness, the value for
+    /// heights is below this interval.
     #[schemars(transform = none_negative)]
     pub variance_component_limits: [f64; 2],
-    /// Observations whose standardised residual exceeds 3.29.
+    /// Number of observations with a standardised residual above 3.29.
     pub beyond_limit: usize,
 }
 
@@ -116,12 +116,12 @@ impl TypeSummary {
     }
 }
 
-/// Coordinates of one kind of point.
+/// Statistics of the coordinates of one kind of point.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct GroundSummary {
-    /// Adjusted minus initial X, Y and Z, metres.
+    /// Adjusted minus initial coordinates X, Y and Z, metres.
     pub corrections_m: [Summary; 3],
-    /// A posteriori standard deviations of X, Y and Z, metres; of footprints with the shift of their profile.
+    /// A posteriori standard deviations of X, Y and Z, metres; for footprints, including the shift of the profile.
     pub sigmas_m: [Summary; 3],
 }
 
@@ -132,7 +132,8 @@ pub struct ImageSummary {
     pub image: String,
     /// Residuals of tie points, along and across the track, focal-plane pixels.
     pub tie_residuals_px: [Summary; 2],
-    /// Adjusted minus initial image coordinates of footprints, lines and pixels; empty when these are off.
+    /// Adjusted minus initial image coordinates of footprints, lines and pixels; empty if
+    /// `adjustment.footprint_image_coordinates` is "off".
     pub mola_corrections: [Summary; 2],
 }
 
@@ -143,38 +144,39 @@ pub struct AdjustmentSummary {
     pub steps: usize,
     /// Degrees of freedom.
     pub degrees_of_freedom: usize,
-    /// A posteriori standard deviation of unit weight over all observations. It mixes unrelated kinds of observation;
-    /// `along` tests the tie points.
+    /// A posteriori standard deviation of unit weight over all observations. The value mixes unrelated kinds of
+    /// observation; `tie_components` tests the tie points.
     #[schemars(range(min = 0.0))]
     pub sigma0: f64,
     /// Model of the adjustment.
     pub model: AdjustmentModel,
-    /// Standard deviation of unit weight of tie points along and across the track; 0 where nothing controls them.
+    /// Standard deviations of unit weight of tie points, along and across the track; 0 without redundancy.
     #[schemars(transform = none_negative)]
     pub tie_components: [f64; 2],
-    /// Standard deviation of the scatter of tie points in addition to their own, focal-plane pixels, from residuals
-    /// along the track, as jitter of the images causes; their standard deviations include it, and 1.4 times as much
-    /// (at most 1.5 px) across the track. 0 where chance explains the residuals, and without a blunder limit.
+    /// Standard deviation of the scatter of tie points in addition to their own standard deviations, focal-plane
+    /// pixels, from residuals along the track; image jitter causes such scatter. The standard deviations of tie points
+    /// include this scatter, and 1.4 times as much (at most 1.5 px) across the track. 0 if chance explains the
+    /// residuals, and without a blunder limit.
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub tie_scatter_px: f64,
-    /// Factor by which covariances scale the a priori variances: 1, or the square of the larger of these where it shows
-    /// that measurements are worse than configured. A good fit never reduces covariances.
+    /// Factor by which covariances scale the a priori variances: 1, or the square of the larger of `tie_components` if
+    /// this shows that measurements are worse than configured. A good fit never reduces covariances.
     #[schemars(range(min = 1.0))]
     pub variance_factor: f64,
-    /// One entry for each kind of observation that occurs.
+    /// Residual statistics of each kind of observation that occurs.
     pub types: Vec<TypeSummary>,
     /// Footprints.
     pub shots: GroundSummary,
     /// Tie points.
     pub ties: GroundSummary,
-    /// One entry for each image, in order.
+    /// Residual statistics of each image, in order.
     pub images: Vec<ImageSummary>,
-    /// Range bias of each profile with its standard deviation, metres, where they are unknowns.
+    /// Range bias of each profile and its standard deviation, metres, if range biases are unknowns.
     #[schemars(transform = at("/items/prefixItems/2", "minimum", 0))]
     pub range_biases_m: Vec<(String, f64, f64)>,
-    /// Unknowns of one image, or of images that share points, with a correlation above 0.95: their values must not be
-    /// interpreted individually.
+    /// Pairs of unknowns of one image, or of images that share points, with a correlation above 0.95: the unknowns of a
+    /// pair must not be interpreted individually.
     #[schemars(transform = at("/items/prefixItems/2", "minimum", -1.000_001))]
     #[schemars(transform = at("/items/prefixItems/2", "maximum", 1.000_001))]
     pub correlated: Vec<(String, String, f64)>,

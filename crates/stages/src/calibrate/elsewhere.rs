@@ -110,9 +110,10 @@ impl ControlOffset {
         // Written so that NaN counts.
         (!(self.offset_m <= self.limit_m)).then(|| {
             format!(
-                "control {} is off by {:.0} m ± {:.0} m on average with the calibration; expected at most {:.0} m, {OFFSET_MAX} \
-                 standard deviations of one of its points and {CALIBRATION_SIGMAS} of the calibration: the laser points of both orbits contradict each other, or the \
-                 orbits do; check datum and reference sphere of both",
+                "the mean offset of control {} is {:.0} m ± {:.0} m with the calibration; expected at most {:.0} m \
+                 ({OFFSET_MAX} standard deviations of one point and {CALIBRATION_SIGMAS} of the calibration): the \
+                 laser points of both orbits, or the orbits, contradict each other; check the datum and reference \
+                 sphere of both orbits",
                 self.words(),
                 self.offset_m,
                 self.mean_sigma_m,
@@ -213,8 +214,9 @@ impl Compared {
         // Written so that NaN counts.
         (!(self.worse_sigmas() <= WORSE_MAX)).then(|| {
             format!(
-                "{}, worse by more than {WORSE_MAX} standard deviations of measurement and laser: check datum, epoch, lines and \
-                 samples of the laser points of both orbits, and that the orbits are as accurate as [a_priori] states",
+                "{}, a deterioration by more than {WORSE_MAX} standard deviations of measurement and laser: check the \
+                 datum, epoch, lines and samples of the laser points of both orbits, and the orbit accuracy in \
+                 [a_priori]",
                 self.words()
             )
         })

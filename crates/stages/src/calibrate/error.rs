@@ -9,11 +9,11 @@ pub enum CalibrateError {
     /// Two images are mounted on different frames.
     #[error(
         "camera {camera} is mounted on frame {found} (instrument_pointing.time_dependent_frames), camera {first} on \
-         {expected}; expected one frame, that of the spacecraft"
+         {expected}; expected the spacecraft's frame for all cameras"
     )]
     #[cause(
-        "write the support data so that instrument_pointing ends in the spacecraft's frame and constant_rotation leads \
-         from there to the camera"
+        "write support data in which instrument_pointing ends in the spacecraft's frame and constant_rotation leads \
+         from this frame to the camera"
     )]
     OtherFrame {
         /// The camera.
@@ -30,7 +30,7 @@ pub enum CalibrateError {
         "cameras {first} and {second} have the same sensor, {sensor}; expected support data of different lines"
     )]
     #[cause(
-        "name_sensor distinguishes the lines of the camera: check the files of cameras.isd and validation.isd"
+        "name_sensor distinguishes the lines of the camera: check the files in cameras.isd and validation.isd"
     )]
     SameSensor {
         /// A camera.
@@ -41,7 +41,7 @@ pub enum CalibrateError {
         sensor: String,
     },
     /// No axis of the spacecraft is near nadir, or near the direction of flight.
-    #[error("no axis of the spacecraft lies within {limit_deg} degrees of {what}")]
+    #[error("no spacecraft axis lies within {limit_deg} degrees of {what}")]
     #[cause(like = OtherFrame)]
     NoAxis {
         /// The direction.
@@ -51,7 +51,7 @@ pub enum CalibrateError {
     },
     /// A camera does not look down.
     #[error(
-        "camera {camera} looks up or across: its look directions are not tangents about the axis that looks down"
+        "camera {camera} looks upwards or sideways: tangents about the downward axis cannot represent its look directions"
     )]
     #[cause(like = OtherFrame)]
     LooksUp {
@@ -71,7 +71,7 @@ pub enum CalibrateError {
     },
     /// Too few tie points.
     #[error(
-        "{found} usable tie points link camera {camera} to another; expected at least {expected} for every camera"
+        "{found} usable tie points link camera {camera} to another camera; expected at least {expected} for every camera"
     )]
     #[cause("measure more points that are visible in several lines")]
     TooFewTies {
@@ -87,7 +87,7 @@ pub enum CalibrateError {
         "{found} control points are usable, {held_back} are withheld; expected at least {expected} of each"
     )]
     #[cause(
-        "give more laser points, or leave out the table control: without control only differential parameters are \
+        "give more laser points, or omit the table [control]: without control, only differential parameters are \
          estimated"
     )]
     TooFewControls {
@@ -101,8 +101,8 @@ pub enum CalibrateError {
     /// Most points do not fit.
     #[error("{misfits} of {all} {what} do not fit the support data, for example {point}: {why}")]
     #[cause(
-        "check that every camera has the support data of its own image and is not exchanged with another, that samples \
-         count from the edge from which the support data count them, and that places are of the same epoch and body"
+        "check that every camera has the support data of its own image, that samples are counted from the same edge as \
+         in the support data, and that positions refer to the same epoch and body"
     )]
     Misfit {
         /// `tie points` or `control points`.
@@ -118,7 +118,7 @@ pub enum CalibrateError {
     },
     /// A control point has two places.
     #[error(
-        "control point {point} has two places; expected one longitude, latitude and radius in all its rows"
+        "control point {point} has two positions; expected the same longitude, latitude and radius in all its rows"
     )]
     #[cause("give every laser point a unique name")]
     TwoPlaces {
@@ -147,7 +147,7 @@ pub enum CalibrateError {
     },
     /// Another orbit has too little laser control.
     #[error("validation {orbit}: {found} control points are usable; expected at least {expected}")]
-    #[cause("give this orbit more laser points, or leave it out of [[validation]]")]
+    #[cause("give this orbit more laser points, or omit it from [[validation]]")]
     ThinValidation {
         /// The orbit.
         orbit: String,
@@ -158,10 +158,10 @@ pub enum CalibrateError {
     },
     /// Another orbit has a file of the calibration.
     #[error(
-        "validation {orbit}: {file} has the same bytes as a file of the calibration itself; expected files of another orbit"
+        "validation {orbit}: {file} is identical to a file of the calibration itself; expected files of another orbit"
     )]
     #[cause(
-        "data used in a calibration cannot validate it: give files of another orbit, or leave this one out"
+        "data used in a calibration cannot validate it: give files of another orbit, or omit this validation"
     )]
     SameFile {
         /// The orbit.
@@ -171,12 +171,12 @@ pub enum CalibrateError {
     },
     /// The camera of another orbit is mounted differently.
     #[error(
-        "validation {orbit}: camera {camera} looks {off_px:.2} px away from its direction in the orbit of the \
-         calibration; expected one mounting and one focal plane within {limit_px} px"
+        "validation {orbit}: the direction of camera {camera} differs by {off_px:.2} px from its direction in the \
+         calibrated orbit; expected the same mounting and focal plane within {limit_px} px"
     )]
     #[cause(
-        "give support data that have the same mounting, focal length and focal plane: the calibration is an offset \
-         from them"
+        "give support data with the same mounting, focal length and focal plane: the calibration is an offset from \
+         these values"
     )]
     OtherMounting {
         /// The orbit.
@@ -191,8 +191,8 @@ pub enum CalibrateError {
     /// The adjustment fails.
     #[error("step {step}: {problem}")]
     #[cause(
-        "check that ties and laser points were measured in these images and cover them, and check their standard \
-         deviations"
+        "check that tie points and laser points were measured in these images and cover the images, and check the \
+         standard deviations of these points"
     )]
     Adjustment {
         /// The step.

@@ -190,7 +190,7 @@ pub(super) fn untested(points: &[OrbitPoint]) -> String {
         .filter(|point| point.is(PointKind::Control))
         .count();
     format!(
-        "{lasers} laser points in use, fewer than {POINTS_MIN} or nearly on a line: heights of tie points are not tested, and \
-         measurements that are wrong along the flight are not identified"
+        "{lasers} laser points are used, fewer than {POINTS_MIN} or nearly on a line: heights of tie points are not \
+         tested, and measurement errors along the flight are not identified"
     )
 }

@@ -62,7 +62,8 @@ pub(super) fn judge(of: &Evidence<'_>) -> Verdict {
     let mut reasons = Vec::new();
     match of.held_back {
         None => reasons.push(format!(
-            "no laser control: absolute pointing is not determined, and results from ties are not validated; not determined by ties: {}",
+            "no laser control: absolute pointing is not determined, and results from tie points are not validated; not \
+             determined by tie points: {}",
             of.sight.unseen_words()
         )),
         Some(held_back) => {
@@ -80,21 +81,21 @@ pub(super) fn judge(of: &Evidence<'_>) -> Verdict {
             Some(worst_px) => reasons.push(format!(
                 "tie points have residuals of {worst_px:.2} px (root mean square); expected at most {TIES_MAX_PX} px"
             )),
-            None => reasons.push("a camera has no usable tie point left".to_owned()),
+            None => reasons.push("one camera has no usable tie points".to_owned()),
         }
     }
     for (what, [all, left_out]) in ["tie", "control"].iter().zip(of.left_out) {
         if left_out as f64 > LEFT_OUT_MAX * all as f64 {
             reasons.push(format!(
-                "{left_out} of {all} {what} points were left out; expected at most a tenth"
+                "{left_out} of {all} {what} points were rejected; expected at most a tenth"
             ));
         }
     }
     for camera in of.cameras {
         if !(camera.moved_px <= MOVED_MAX * of.known.image_px) {
             reasons.push(format!(
-                "the calibration moves camera {} by {:.0} px; expected at most {:.0} px, {MOVED_MAX} standard deviations of the a priori orbit and \
-                 attitude",
+                "the calibration changes look directions of camera {} by up to {:.0} px; expected at most {:.0} px, \
+                 {MOVED_MAX} standard deviations of the a priori orbit and attitude",
                 camera.camera,
                 camera.moved_px,
                 MOVED_MAX * of.known.image_px
@@ -117,8 +118,8 @@ pub(super) fn judge(of: &Evidence<'_>) -> Verdict {
 /// Errors that no datum of the calibration shows.
 fn untested(of: &Evidence<'_>) -> Vec<String> {
     let mut untested = vec![
-        "an error of place or radius that the control of all orbits shares (no other control is available)".to_owned(),
-        "a shift along the flight that all ties of a line share (it acts like an angle of the line)".to_owned(),
+        "an error in position or radius that the control of all orbits shares (no other control is available)".to_owned(),
+        "a shift along the flight that all tie points of a line share (equivalent to an angle of the line)".to_owned(),
     ];
     let offsets = of.validation.iter().flat_map(|orbit| &orbit.offsets);
     let largest_m = |in_height: bool| {
@@ -129,8 +130,8 @@ fn untested(of: &Evidence<'_>) -> Vec<String> {
     };
     if let Some((plane_m, height_m)) = largest_m(false).zip(largest_m(true)) {
         untested.push(format!(
-            "an error of the control of the calibrated orbit up to {plane_m:.0} m in the plane and {height_m:.0} m in height \
-             (the control of other orbits reveals larger errors only)"
+            "an error of up to {plane_m:.0} m in the plane and {height_m:.0} m in height in the control of the \
+             calibrated orbit (control of other orbits reveals only larger errors)"
         ));
     }
     untested
@@ -154,8 +155,8 @@ impl Judged {
         // Written so that NaN is a reason.
         (!(found.sigmas <= *limit)).then(|| {
             format!(
-                "{what} are {:.2} times as large as expected (root mean square); expected at most {limit:.2} times: \
-                 standard deviations are too small, or an error has a source other than the camera",
+                "{what} are {:.2} times as large as expected (root mean square); limit {limit:.2}: standard deviations \
+                 are too small, or an error has a source other than the camera",
                 found.sigmas
             )
         })
@@ -267,9 +268,9 @@ fn coarse(held_back: &HeldBack, known: Known) -> Option<String> {
     let better = plane_m < std::f64::consts::SQRT_2 * known.ground_m && height_m < known.ground_m;
     (!better).then(|| {
         format!(
-            "the accuracy of a tie point is {plane_m:.0} m in the plane and {height_m:.0} m in height, against \
-             {:.0} m per axis from the a priori orbit and attitude: the laser control is too coarse, too sparse or too far away \
-             to determine the pointing",
+            "the accuracy of a tie point is {plane_m:.0} m in the plane and {height_m:.0} m in height, compared with \
+             {:.0} m per axis from the a priori orbit and attitude: the laser control is too coarse, too sparse or too \
+             far away to determine the pointing",
             known.ground_m
         )
     })
@@ -289,8 +290,8 @@ fn remarks(of: &Evidence<'_>) -> Vec<String> {
     say(
         of.mode == CalibrationMode::AsPublished,
         format!(
-            "all angles are free in the step of ties, as published: {} combinations of them are not determined ({}), and a difference \
-             of scale is taken for a common pitch; the figures after this step may have large errors",
+            "all angles are free in the tie-point step, as published: {} combinations of angles are not determined \
+             ({}), and a difference in scale appears as a common pitch; values after this step may have large errors",
             of.sight.unseen,
             of.sight.unseen_words()
         ),
@@ -298,15 +299,15 @@ fn remarks(of: &Evidence<'_>) -> Vec<String> {
     for [all, left_out] in of.left_out {
         say(
             left_out > 0,
-            format!("points left out: {left_out} of {all}"),
+            format!("points rejected: {left_out} of {all}"),
         );
     }
     let sigmas = ties_px.unwrap_or_default() / of.tie_sigma_px;
     say(
         sigmas > TIES_SIGMAS,
         format!(
-            "residuals of tie points are {sigmas:.1} times their standard deviations (root mean square): these are too small, and positions \
-             are less accurate than stated"
+            "residuals of tie points are {sigmas:.1} times their standard deviations (root mean square): the standard \
+             deviations are too small, and positions are less accurate than stated"
         ),
     );
     say(
@@ -315,14 +316,15 @@ fn remarks(of: &Evidence<'_>) -> Vec<String> {
             let both = [plane, height].into_iter().flatten();
             both.clone().next().is_some() && both.into_iter().all(|of| of.sigmas < SCATTER_MIN)
         }),
-        "withheld control fits better than its standard deviations predict: they may be larger than needed".to_owned(),
+        "withheld control fits better than its standard deviations predict: these may be too large"
+            .to_owned(),
     );
     for camera in of.cameras {
         say(
             camera.isd_left_px > ISD_LEFT_PX,
             format!(
                 "the calibrated support data of camera {} deviate by up to {:.2} px from its look directions, which \
-                 bend: support data hold only a straight line of equal samples",
+                 are curved: support data represent only a straight line of equal samples",
                 camera.camera, camera.isd_left_px
             ),
         );
@@ -344,7 +346,10 @@ fn remarks(of: &Evidence<'_>) -> Vec<String> {
     }
     say(
         of.complaints > 0,
-        format!("rows and points left out, with reasons: {}", of.complaints),
+        format!(
+            "rows and points skipped or rejected, with reasons: {}",
+            of.complaints
+        ),
     );
     remarks
 }

@@ -216,7 +216,8 @@ fn fits(point: &GroundPoint, expected: &Expected<'_>) -> std::result::Result<(),
         let off_px = residual.norm() / pixels[sight.camera];
         if !(off_px <= limit_px) {
             return Err(format!(
-                "it is {off_px:.0} px from its position according to the support data; expected at most {limit_px} px"
+                "its measurement is {off_px:.0} px away from its position according to the support data; expected at \
+                 most {limit_px} px"
             ));
         }
     }

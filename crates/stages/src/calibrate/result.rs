@@ -41,15 +41,16 @@ pub struct Calibration {
     pub complaint_count: u64,
 }
 
-/// The test of heights of tie points against the ground between laser points.
+/// Test of tie-point heights against the ground between laser points.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TieGround {
-    /// Tie points that were tested last.
+    /// Number of tie points in the last test.
     pub tested: u64,
-    /// Height above or below the ground, in standard deviations, beyond which a tie point is rejected.
+    /// Limit of the height above or below the ground, standard deviations; tie points beyond this limit are rejected.
     #[schemars(range(min = 0.0))]
     pub limit_sigmas: f64,
-    /// This limit in metres, for the median of the tie points: smaller errors along the flight are not identified.
+    /// Median over the tie points of the limit of the height above or below the ground, metres: smaller errors along
+    /// the flight are not identified.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
     pub limit_m: Option<f64>,
 }
@@ -59,7 +60,7 @@ pub struct TieGround {
 pub struct Value {
     /// The number.
     pub value: f64,
-    /// Its standard deviation; 0 for one that was not free.
+    /// Standard deviation of the number; 0 for a parameter that was not free.
     #[schemars(range(min = 0.0))]
     pub sigma: f64,
 }
@@ -92,26 +93,26 @@ pub struct CameraResult {
     pub isd_left_px: f64,
 }
 
-/// Figures of points after a step.
+/// Statistics of the points after a step.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CalibrationStep {
-    /// `before`, `ties`, `external`, `internal` or `joint`.
+    /// Name of the step: `before`, `ties`, `external`, `internal` or `joint`.
     pub step: String,
-    /// The free parameters, in words.
+    /// Free parameters, in words.
     pub free: String,
-    /// Steps of the adjustment; 0 before any.
+    /// Number of iterations of the adjustment; 0 for `before`.
     pub steps: u32,
     /// The figures.
     pub figures: Figures,
 }
 
-/// Root mean squares, as in tables 5 to 7 of Li et al. 2023.
+/// Root mean squares, as in Tables 5 to 7 of Li et al. 2023.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Figures {
     /// Tie points after intersection.
     pub ties: TieFigures,
-    /// Control points that the calibration uses, and withheld ones; empty without control. Other orbits have no
-    /// withheld points.
+    /// Control points that the calibration uses, and withheld control points; empty without control. Other orbits have
+    /// no withheld points.
     pub control: Vec<ControlFigures>,
 }
 
@@ -128,7 +129,8 @@ impl Figures {
 pub struct TieFigures {
     /// Points.
     pub points: u64,
-    /// Root mean square of every camera across and along the flight, pixels; missing for a camera without tie points.
+    /// Root mean square residuals of every camera, across and along the flight, pixels; missing for a camera without
+    /// tie points.
     pub cameras_px: Vec<[Option<f64>; 2]>,
 }
 
@@ -149,22 +151,23 @@ pub struct ControlFigures {
     pub kind: PointKind,
     /// Points.
     pub points: u64,
-    /// Of every camera: distance between projected and measured image position of the laser points.
+    /// Distances between projected and measured image positions of the laser points, for every camera.
     pub cameras: Vec<PixelsAndMetres>,
-    /// Points in two cameras or more.
+    /// Number of points in two cameras or more.
     pub heights: u64,
-    /// Root mean square of their intersected height minus the laser's, metres; missing without such a point.
+    /// Root mean square of intersected minus laser height of points in two cameras or more, metres; missing if there
+    /// are none.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
     pub height_m: Option<f64>,
 }
 
-/// In the focal plane, and on the ground; missing for a camera without points.
+/// Distances in the focal plane and on the ground; missing for a camera without points.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PixelsAndMetres {
-    /// Root mean square distance, pixels.
+    /// Root mean square distance in the focal plane, pixels.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
     pub plane_px: Option<f64>,
-    /// Root mean square distance of the ray at the laser's radius from the laser's place, metres.
+    /// Root mean square distance between the laser position and the ray at the radius of the laser point, metres.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
     pub plane_m: Option<f64>,
 }
@@ -174,49 +177,50 @@ pub struct PixelsAndMetres {
 pub struct HeldBack {
     /// Points.
     pub points: u64,
-    /// Ratio of their residuals to the expected ones.
+    /// Ratio of the residuals of withheld control to the expected residuals.
     pub scatter: Scatter,
-    /// Number of them in two cameras or more, whose positions are intersected.
+    /// Number of withheld points in two cameras or more, whose positions are intersected.
     pub intersected: u64,
-    /// Root mean square of intersected minus laser position, horizontally, metres, including errors of laser and
-    /// measurement. Missing where no point is intersected, as are the next two.
+    /// Root mean square horizontal distance between intersected and laser positions, metres, including laser and
+    /// measurement errors; missing if no point is intersected.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
     pub plane_m: Option<f64>,
-    /// Root mean square of intersected minus laser height, metres.
+    /// Root mean square of intersected minus laser height, metres; missing if no point is intersected.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
     pub height_m: Option<f64>,
-    /// Mean of intersected minus laser position east, north and up, metres.
+    /// Mean of intersected minus laser position, east, north and up, metres; missing if no point is intersected.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
     pub mean_m: Option<[f64; 3]>,
     /// Stated accuracy of a tie point in the plane, metres: root mean square of the standard deviations, scaled by the
-    /// scatter in the plane of used or withheld control where that exceeds 1.
+    /// scatter of used or withheld control in the plane if this scatter exceeds 1.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
     pub accuracy_plane_m: Option<f64>,
-    /// Stated accuracy of the height of a tie point, metres.
+    /// Stated accuracy of a tie point in height, metres.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
     pub accuracy_height_m: Option<f64>,
 }
 
-/// Root mean square of the residuals of control over those expected from measurement, laser and calibration: near 1
-/// when standard deviations are correct. Plane and height are separate, as too large standard deviations of the one
-/// hide errors of the other.
+/// Ratio of the root mean square residual of control to the value expected from measurement, laser and calibration:
+/// near 1 if standard deviations are correct. Plane and height are separate, because too large standard deviations in
+/// one hide errors in the other.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Scatter {
-    /// East and north; missing where the points have no redundancy.
+    /// Scatter in east and north; missing if the points have no redundancy.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
     pub plane: Option<Scattered>,
-    /// Up, of points in two cameras or more; missing without such a point.
+    /// Scatter in height of points in two cameras or more; missing if there are none.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
     pub height: Option<Scattered>,
 }
 
-/// A root mean square over its expectation.
+/// Ratio of a root mean square to its expected value.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Scattered {
-    /// Root mean square of the residuals over the expected ones.
+    /// Ratio of the root mean square residual to its expected value.
     #[schemars(range(min = 0.0))]
     pub sigmas: f64,
-    /// Number of coordinates that are free to differ; smaller for used points, as the calibration follows them.
+    /// Number of coordinates that are free to differ; smaller for used points, because the calibration follows these
+    /// points.
     #[schemars(range(min = 0.0))]
     pub coordinates: f64,
 }
@@ -251,7 +255,7 @@ pub struct CalibrationRound {
     pub judging: [u64; 2],
     /// Median length of the shifts of kept units that calibrate, cells.
     pub shift_cells: f64,
-    /// Median of model minus laser, metres.
+    /// Median of model minus laser height, metres.
     pub bias_m: Option<f64>,
     /// Residuals of control, root mean square over all lines, pixels and metres on the ground.
     pub control: PixelsAndMetres,
@@ -276,30 +280,30 @@ pub struct ValidationResult {
     pub before: Figures,
     /// With the calibration, unchanged.
     pub after: Figures,
-    /// Mean offsets of its control with the calibration: in the plane of every camera, and in height.
+    /// Mean offsets of the control of the orbit with the calibration, in the plane of every camera and in height.
     pub offsets: Vec<ControlOffset>,
 }
 
 /// Mean offset of the control of another orbit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ControlOffset {
-    /// The camera in whose plane it is; absent for height.
+    /// Camera in whose plane the offset is measured; absent for an offset in height.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
     pub camera: Option<String>,
-    /// Length of the mean offset in the plane, or of the mean height above the laser, metres.
+    /// Length of the mean offset in the plane, or absolute mean height above the laser, metres.
     #[schemars(range(min = 0.0))]
     pub offset_m: f64,
     /// Standard deviation of one control point from measurement and laser, metres.
     #[schemars(range(min = 0.0))]
     pub point_sigma_m: f64,
-    /// Standard deviation of the mean from measurement and laser, metres: errors of the orbit and of the calibration are
-    /// additional.
+    /// Standard deviation of the mean offset from measurement and laser, metres, without errors of the orbit and of the
+    /// calibration.
     #[schemars(range(min = 0.0))]
     pub mean_sigma_m: f64,
-    /// Standard deviation from the calibration, metres.
+    /// Standard deviation of the mean offset from the calibration, metres.
     #[schemars(range(min = 0.0))]
     pub calibration_sigma_m: f64,
-    /// The largest permitted offset, metres.
+    /// Largest permitted offset, metres.
     #[schemars(range(min = 0.0))]
     pub limit_m: f64,
 }
@@ -308,11 +312,11 @@ pub struct ControlOffset {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum PointKind {
-    /// Its position is unknown.
+    /// Tie point.
     Tie,
-    /// The laser gives its position.
+    /// Laser point.
     Control,
-    /// The laser gives its position; withheld for validation.
+    /// Laser point, withheld for validation.
     HeldBack,
 }
 

@@ -219,7 +219,8 @@ fn untested_words(work: &Work<'_>) -> Vec<String> {
     }
     let ground = work.tie_ground.is_none().then(|| untested(&work.points));
     let orbit = work.config.validation.is_empty().then(|| {
-        "no other orbit ([[validation]]): an error common to all laser points, such as another reference sphere, is not tested"
+        "no other orbit ([[validation]]): an error common to all laser points, such as a different reference sphere, \
+         is not tested"
             .to_owned()
     });
     ground.into_iter().chain(orbit).collect()
@@ -378,7 +379,7 @@ impl Work<'_> {
                     of.left_out = true;
                     any = true;
                     complaints.tell(format!(
-                        "{}: residual of {missed:.1} standard deviations, far above the others; left out",
+                        "{}: residual of {missed:.1} standard deviations, far above those of other points; rejected",
                         of.name
                     ));
                 }
@@ -398,8 +399,8 @@ impl Work<'_> {
             let point = &mut self.points[of.index];
             point.left_out = true;
             complaints.tell(format!(
-                "{}: its height is {:+.0} m from the ground between laser points, {:.1} standard deviations: a measurement is wrong along \
-                 the flight; left out",
+                "{}: height {:+.0} m relative to the ground between laser points, {:.1} standard deviations, due to a \
+                 measurement error along the flight; rejected",
                 point.name,
                 of.above_m,
                 of.sigmas.abs()

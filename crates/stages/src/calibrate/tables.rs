@@ -103,7 +103,8 @@ impl Cameras<'_> {
         } else {
             let [lines, samples] = self.sizes[camera];
             Err(format!(
-                "point {} is at line {}, sample {} of camera {}; expected a place within its {lines} lines and {samples} samples",
+                "point {} is at line {}, sample {} of camera {}; expected a position within its {lines} lines and \
+                 {samples} samples",
                 row.point, row.line, row.sample, row.camera
             ))
         })
@@ -218,7 +219,7 @@ pub(super) fn control(
     let repeated = repeated(&points);
     for (point, first) in &repeated {
         complaints.tell(format!(
-            "control point {} is less than {SAME_PLACE_M} m from control point {} and duplicates it; left out",
+            "control point {} is less than {SAME_PLACE_M} m from control point {} and duplicates it; rejected",
             points[*point].name, points[*first].name
         ));
     }

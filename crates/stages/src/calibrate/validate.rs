@@ -253,7 +253,8 @@ fn orbit(
     }
     for other in found {
         complaints.tell(format!(
-            "validation {}: support data of {} match no camera of the calibration, or one that already has some; not used",
+            "validation {}: support data of {} are not used, because they match no camera of the calibration, or a \
+             camera that already has support data",
             of.id, other.support.instrument.name
         ));
     }

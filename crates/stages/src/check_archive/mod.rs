@@ -80,7 +80,7 @@ const COMPLAINTS_KEPT: usize = 5;
 pub struct ArchiveRules<'a> {
     /// The clock of MOLA.
     pub clock: &'a MolaClock,
-    /// Limits and the scan of clock biases.
+    /// Limits, and settings for the scan of clock biases.
     pub limits: &'a RangeCheckConfig,
     /// Shots that are checked.
     pub filter: &'a ShotFilter,
@@ -101,7 +101,7 @@ pub struct FileRanges {
     pub records: u64,
     /// Shots that were checked against the kernels.
     pub shots: u64,
-    /// Shots without a position in the kernels.
+    /// Number of shots without a spacecraft position in the kernels.
     pub not_covered: u64,
     /// Shots that were rejected, by reason.
     pub rejected: BTreeMap<ShotRejection, u64>,

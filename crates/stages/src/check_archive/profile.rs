@@ -48,7 +48,7 @@ pub struct ArchiveProfile {
     pub spans_et_s: Vec<[f64; 2]>,
     /// Shots that were checked.
     pub shots: u32,
-    /// Shots without a position in the kernels.
+    /// Number of shots without a spacecraft position in the kernels.
     pub not_covered: u32,
     /// Mean and largest off-nadir angle, radians.
     pub off_nadir_rad: [f64; 2],
@@ -281,7 +281,7 @@ impl ArchiveProfile {
         self.invalid_because = figures.broken_limits(rules.limits, why);
     }
 
-    /// Whether it has enough shots to be compared with the limits.
+    /// Whether the profile has enough shots for a comparison with the limits.
     #[must_use]
     pub const fn is_judged(&self) -> bool {
         self.share_of_limits.is_some()

@@ -35,16 +35,16 @@ pub struct FileFailure {
     pub why: String,
 }
 
-/// A file with the bytes of another one.
+/// A file that is identical to another file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct FileCopy {
     /// Its path, as requested.
     pub file: String,
-    /// Path of the other file, which was used.
+    /// Path of the identical file that was used.
     pub of: String,
 }
 
-/// A kernel that positions may depend on.
+/// A kernel on which positions may depend.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct KernelUsed {
     /// File name without folders.
@@ -70,7 +70,7 @@ pub struct ArchiveRanges {
     pub allow_uncovered: bool,
     /// The clock of MOLA.
     pub clock: MolaClock,
-    /// Limits and the scan of clock biases.
+    /// Limits, and settings for the scan of clock biases.
     pub limits: RangeCheckConfig,
     /// Shots that were checked.
     pub filter: ShotFilter,
@@ -146,7 +146,7 @@ impl ArchiveRanges {
         [without, self.profiles().filter(partly).count()]
     }
 
-    /// Whether every file could be read, and every profile is covered by the kernels and keeps the limits.
+    /// Whether every file could be read, and every profile is covered by the kernels and within the limits.
     #[must_use]
     pub fn verdict(&self) -> Verdict {
         let mut remarks = Vec::new();
@@ -162,7 +162,7 @@ impl ArchiveRanges {
         if short > 0 {
             let least = self.limits.shots_min;
             remarks.push(format!(
-                "profiles of fewer than {least} shots, which are not judged: {short}"
+                "profiles with fewer than {least} shots, which are not judged: {short}"
             ));
         }
         if !self.copies.is_empty() {
@@ -173,7 +173,7 @@ impl ArchiveRanges {
         let complaints = self.sum(|file| file.complaint_count);
         if complaints > 0 {
             remarks.push(format!(
-                "{complaints} complaints about records and labels; the data that they name were left out"
+                "{complaints} complaints about records and labels; the data concerned were skipped"
             ));
         }
         Verdict {
@@ -198,7 +198,7 @@ impl ArchiveRanges {
             self.profiles().filter(is_beyond).count(),
             self.profiles().count(),
         );
-        let summary = format!("{beyond} of {all} profiles break a limit, the worst of them:");
+        let summary = format!("{beyond} of {all} profiles exceed a limit; the worst are:");
         let summary = (beyond > 0).then_some(summary).into_iter();
         let named = self.worst(beyond.min(NAMED)).into_iter();
         let named = named.map(|(_, of)| format!("{}: {}", of.id(), of.invalid_because.join("; ")));
@@ -214,8 +214,8 @@ impl ArchiveRanges {
         });
         damaged.take(NAMED).map(|file| {
             format!(
-                "{}: {} complaints about {} records; expected at most {UNUSABLE_MAX} plus one in a hundred: the file \
-                 was damaged in transfer",
+                "{}: {} complaints about {} records; expected at most {UNUSABLE_MAX} plus one per hundred records: the \
+                 file was damaged in transfer",
                 file.file, file.complaint_count, file.records
             )
         })
@@ -245,8 +245,8 @@ impl ArchiveRanges {
         let (shots, all) = (self.sum(|file| file.not_covered), self.profiles().count());
         (without + partly > 0).then(|| {
             format!(
-                "the kernels have no position for {shots} shots: {without} of {all} profiles could not be checked, \
-                 {partly} only in part"
+                "the kernels contain no position for {shots} shots: {without} of {all} profiles could not be checked, \
+                 and {partly} only in part"
             )
         })
     }
@@ -321,7 +321,7 @@ mod tests {
         let good = ranges(vec![profile(1, 900, Some(0.4)), remnant()]);
         let verdict = good.verdict();
         assert!(verdict.valid, "{:?}", verdict.reasons);
-        assert!(verdict.remarks[0].starts_with("profiles of fewer than 20 shots"));
+        assert!(verdict.remarks[0].starts_with("profiles with fewer than 20 shots"));
         assert!(!ranges(vec![remnant()]).verdict().valid);
         let bad = ranges(vec![
             remnant(),
@@ -332,10 +332,7 @@ mod tests {
         let orbits: Vec<u32> = bad.worst(9).iter().map(|(_, of)| of.orbit).collect();
         assert_eq!(orbits, [5, 4, 3]);
         let reasons = bad.verdict().reasons;
-        assert_eq!(
-            reasons[0],
-            "2 of 4 profiles break a limit, the worst of them:"
-        );
+        assert_eq!(reasons[0], "2 of 4 profiles exceed a limit; the worst are:");
         assert_eq!(reasons[1..], ["a.b/5: a limit", "a.b/4: a limit"]);
     }
 }

@@ -15,7 +15,7 @@ pub struct RangeFigures {
     pub outliers: u32,
     /// Mean of range − distance with and without outliers, metres.
     pub mean_m: [f64; 2],
-    /// Mean of range − distance to the file's own spacecraft, with and without outliers, metres.
+    /// Mean of range − distance to the spacecraft position in the file, with and without outliers, metres.
     pub decoding_m: [f64; 2],
     /// Mean of the file's own minus the kernels' spacecraft position, radial, along and across the track, metres.
     pub spacecraft_m: [f64; 3],
@@ -62,7 +62,7 @@ impl RangeFigures {
         for (name, [with_outliers_m, mean_m], limit_m) in [
             ("range − distance", self.mean_m, limits.mean_max_m),
             (
-                "range − distance to the file's own spacecraft",
+                "range − distance to the spacecraft position in the file",
                 self.decoding_m,
                 limits.decoding_max_m,
             ),
@@ -98,8 +98,8 @@ impl RangeFigures {
         // Written so that NaN breaks the limit.
         (!(apart_m <= limit_m)).then(|| {
             format!(
-                "the spacecraft position stated with the shots differs by {apart_m:.0} m from the kernels' ({} m up, {} m along \
-                 the flight, {} m across it); limit {limit_m} m: {}",
+                "the spacecraft position stated with the shots differs by {apart_m:.0} m from the position in the \
+                 kernels ({} m up, {} m along the flight, {} m across it); limit {limit_m} m: {}",
                 signed(radial, 0),
                 signed(along, 0),
                 signed(cross, 0),

@@ -68,7 +68,7 @@ stage_inputs! {
         pub kernels: &'a KernelView,
         /// The clock of MOLA.
         pub altimeter_clock: &'a MolaClock,
-        /// Limits and the scan of clock biases.
+        /// Limits, and settings for the scan of clock biases.
         pub range_check: &'a RangeCheckConfig,
     }
 }
@@ -160,7 +160,7 @@ pub struct ProfileRanges {
     pub spacecraft_m: [Summary; 3],
     /// Mean of range − distance without outliers, metres; a judged value.
     pub mean_without_outliers_m: f64,
-    /// Mean of range − distance to the file's own spacecraft without the same shots, metres; a judged value.
+    /// Mean of range − distance to the spacecraft position in the file without the same shots, metres; a judged value.
     pub decoding_without_outliers_m: f64,
     /// Linear trend of range − distance over time, metres per second.
     pub trend_m_s: Option<Trend>,
@@ -246,7 +246,7 @@ impl ProfileRanges {
 
 /// A shot outside the tabulated trajectory.
 #[derive(Debug, thiserror::Error, Cause)]
-#[error("profile {profile}: no spacecraft position at {at}, the time of a shot")]
+#[error("profile {profile}: no spacecraft position at the shot time {at}")]
 #[cause(Coverage: "add a spacecraft ephemeris (SPK) that covers the PEDR files")]
 struct OutsideTrajectory {
     profile: String,

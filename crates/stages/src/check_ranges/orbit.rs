@@ -29,7 +29,7 @@ pub(super) fn cause(
     limit_m: f64,
 ) -> String {
     together(footprints, profile, trajectory, clock, limit_m)
-        .unwrap_or_else(|| "the kernels contain an orbit other than the file's".to_owned())
+        .unwrap_or_else(|| "the orbit in the kernels differs from the orbit in the file".to_owned())
 }
 
 fn together(
@@ -51,7 +51,7 @@ fn together(
         let moved_m = body_matrix(other.model(), at).tr_mul(&coordinates_m);
         if other != datum && (moved_m - position.xyz_m).norm() <= limit_m {
             return Some(format!(
-                "they agree if its coordinates refer to {other} instead of {datum} (pedr.datum)"
+                "the positions agree if the coordinates of the file refer to {other} instead of {datum} (pedr.datum)"
             ));
         }
     }
@@ -67,8 +67,8 @@ fn together(
         0.0
     };
     Some(format!(
-        "they agree if time tags are corrected by {} s instead of {} s (altimeter_clock); otherwise the kernels contain a \
-         different orbit",
+        "the positions agree if time tags are corrected by {} s instead of {} s (altimeter_clock); otherwise the \
+         kernels contain a different orbit",
         signed(used_s + along / velocity_m_s.norm(), 3),
         signed(used_s, 3)
     ))

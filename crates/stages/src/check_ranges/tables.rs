@@ -150,8 +150,8 @@ pub fn check_table_ranges(
         let mut ranges = statistics(profile, &shots, first, None, footprints);
         by_own_spacecraft(&mut ranges, footprints, profile, limits);
         let explain = || {
-            "support data or kernels contain an orbit other than the table's, or times or radii of the table \
-             are in error".to_owned()
+            "the orbit in support data or kernels differs from the orbit in the table, or times or radii in the table \
+             are incorrect".to_owned()
         };
         ranges.invalid_because = ranges
             .figures()

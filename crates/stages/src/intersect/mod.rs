@@ -133,10 +133,10 @@ pub enum TieRejection {
     #[error("{0}")]
     Rays(Unintersected),
     /// An image cannot see the intersected point.
-    #[error("an image does not see the intersected point")]
+    #[error("an image does not show the intersected point")]
     Unseen,
     /// Another tie point before it has the same identifier.
-    #[error("its identifier was used before")]
+    #[error("an earlier tie point has the same identifier")]
     Duplicate,
     /// Two of its measurements are in one image.
     #[error("it is measured twice in one image")]
@@ -151,7 +151,7 @@ pub enum TieRejection {
 
 /// An orientation that sees no ground.
 #[derive(Debug, Clone, PartialEq, thiserror::Error, Cause)]
-#[error("image {image}: its orientation sees no ground: {unseen}")]
+#[error("image {image} shows no ground according to its orientation: {unseen}")]
 #[cause(Input: "check the orientation samples of the image")]
 struct BlindImage {
     image: String,

@@ -10,10 +10,10 @@ use areograph_geom::statistics::Summary;
 /// for normal ones there, this is 3.6 standard deviations, one point in three thousand.
 const OUTLIER_SIGMA: f64 = 5.0;
 
-/// Statistics along and across the track.
+/// Residual statistics along and across the track.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Residuals2 {
-    /// Along the track: focal-plane pixels, or lines.
+    /// Along the track, focal-plane pixels or lines.
     pub along: Summary,
     /// Across the track, pixels.
     pub across: Summary,
@@ -24,7 +24,7 @@ pub struct Residuals2 {
 pub struct ImageResiduals {
     /// Identifier of the image.
     pub image: String,
-    /// Focal residuals, pixels in both axes.
+    /// Residuals in the focal plane, pixels on both axes.
     pub focal: Residuals2,
     /// Reprojection residuals, lines along the track and pixels across it.
     pub reprojection: Residuals2,

@@ -41,7 +41,7 @@ impl AdjustmentEvidence<'_> {
         let (left_out, ties) = (self.left_out(), self.ties.multi_image());
         if 2 * left_out > ties {
             invalid.push(format!(
-                "adjustment: {left_out} of {ties} tie points were rejected; ties.parquet states why"
+                "adjustment: {left_out} of {ties} tie points were rejected; ties.parquet states the reasons"
             ));
         }
         let rounds = [
@@ -51,7 +51,8 @@ impl AdjustmentEvidence<'_> {
         let parted = self.parted();
         if !parted.is_empty() {
             invalid.push(format!(
-                "no tie point of {} was used in the adjustment: check their labels, and the tie points in ties.parquet",
+                "no tie point of {} was used in the adjustment: check the labels of these images, and the tie points \
+                 in ties.parquet",
                 parted.join("; ")
             ));
         }
@@ -62,8 +63,8 @@ impl AdjustmentEvidence<'_> {
         for (round, pairs, limit_m) in rounds {
             for pair in pairs.iter().filter(|pair| !is_together(pair, limit_m)) {
                 invalid.push(format!(
-                    "tie points of {} and {} lie {:.1} m apart along the flight {round} the adjustment, expected at most \
-                     {limit_m} m",
+                    "tie-point positions from {} and {} differ by {:.1} m along the flight {round} the adjustment, \
+                     expected at most {limit_m} m",
                     pair.images[0], pair.images[1], pair.along_track_parallax_m
                 ));
             }
@@ -81,10 +82,9 @@ impl AdjustmentEvidence<'_> {
         // Written so that NaN counts.
         (!(*sigmas <= limit)).then(|| {
             format!(
-                "laser and images contradict each other: the {unknown} differs by {sigmas:.1} standard deviations \
-                 from its a priori value, expected at most {limit}; check beam.bus of the altimeter, altimeter_clock and \
-                 the times of the images, or leave out \
-                 adjustment.common_bus"
+                "laser and images contradict each other: the {unknown} differs by {sigmas:.1} standard deviations from \
+                 its a priori value, expected at most {limit}; check beam.bus of the altimeter, altimeter_clock and \
+                 the image times, or omit adjustment.common_bus"
             )
         })
     }
@@ -94,7 +94,7 @@ impl AdjustmentEvidence<'_> {
         match self.adjusted.boresight.as_ref()? {
             Err(reason) => Some(format!("adjustment.common_bus has no effect: {reason}")),
             Ok(boresight) if !boresight.without.is_empty() => Some(format!(
-                "adjustment.common_bus does not control {}: no shot of a profile falls within their exposure",
+                "adjustment.common_bus does not control {}: no shot of a profile was fired during the exposure",
                 boresight.without.join(", ")
             )),
             Ok(_) => None,
@@ -113,8 +113,8 @@ impl AdjustmentEvidence<'_> {
     fn spots_spoiled(&self) -> Option<String> {
         self.spots_beyond().map(|spots| {
             format!(
-                "{} of {} image coordinates of laser spots exceed 3.29 of their standard deviations: some shots are \
-                 recorded at a wrong position, or profiles and line times are less accurate than configured",
+                "residuals of {} of {} image coordinates of laser spots exceed 3.29 standard deviations: some shots \
+                 are recorded at a wrong position, or profiles and line times are less accurate than configured",
                 spots.beyond_limit, spots.observations
             )
         })
@@ -139,8 +139,8 @@ impl AdjustmentEvidence<'_> {
             // Written so that NaN counts.
             if check.surface.is_ok() && !(check.above_m.median.abs() <= limit_m) {
                 reasons.push(format!(
-                    "tie points lie {} m from the {altimeter} surface {round} the adjustment (median of {}), expected at most \
-                     {limit_m:.1} m",
+                    "tie points lie {} m above the {altimeter} surface {round} the adjustment (median of {}), expected \
+                     at most ±{limit_m:.1} m",
                     signed(check.above_m.median, 1),
                     check.above_m.n
                 ));
@@ -150,7 +150,7 @@ impl AdjustmentEvidence<'_> {
             let (sigmas, limit) = (apart.sigmas(), apart.limit(limits.profiles_apart_max_sigma));
             if !(sigmas <= limit) {
                 reasons.push(format!(
-                    "profiles {} and {} contradict each other: at the tie points their surfaces lie {:.1} m apart on \
+                    "profiles {} and {} contradict each other: their surfaces at the tie points differ by {:.1} m on \
                      average, {sigmas:.1} standard deviations, expected at most {limit:.1}",
                     apart.profiles[0],
                     apart.profiles[1],
@@ -171,7 +171,7 @@ impl AdjustmentEvidence<'_> {
         if !heights.settled {
             remarks.push(format!(
                 "heights of tie points, and the {altimeter} surface under them, had not converged when the adjustment \
-                 ended: they are less certain than stated"
+                 ended: these heights are less certain than stated"
             ));
         }
         let [_, _, up_m] = heights.mean_sigma_m;
@@ -187,7 +187,7 @@ impl AdjustmentEvidence<'_> {
         }
         if heights.compared < HEIGHTS_MIN {
             remarks.push(format!(
-                "{} tie points are too few for the detection of blunders by their heights",
+                "{} tie points are too few for the detection of blunders from their heights",
                 heights.compared
             ));
         }
@@ -254,8 +254,8 @@ impl AdjustmentEvidence<'_> {
         above.map(|of| {
             let [_, most] = of.variance_component_limits;
             format!(
-                "residuals of {} are {:.2} times their a priori standard deviations, by chance at most {most:.2}: these are too \
-                 small, or a model does not hold",
+                "residuals of {} are {:.2} times their a priori standard deviations, by chance at most {most:.2}: the \
+                 standard deviations are too small, or a model is incorrect",
                 terms.fill(of.kind.words()),
                 of.variance_component
             )
@@ -302,7 +302,7 @@ impl AdjustmentEvidence<'_> {
         let both = self.heights.surface.as_ref();
         match both.and(self.adjusted_heights.surface.as_ref()) {
             Err(reason) => remarks.push(format!(
-                "heights of tie points are not controlled by {} ({reason}): they are only as accurate as the a \
+                "{} does not control heights of tie points ({reason}): these heights are only as accurate as the a \
                  priori orbit and attitude",
                 evidence.terms.altimeter
             )),
@@ -310,24 +310,24 @@ impl AdjustmentEvidence<'_> {
         }
         if self.adjusted.summary.model == AdjustmentModel::Published {
             remarks.push(
-                "the adjustment follows the published model (adjustment.model): its heights are not controlled, and \
-                 its standard deviations state only the agreement between the images; across the track it departs from the \
-                 paper (decision 0010)"
+                "the adjustment follows the published model (adjustment.model): heights are not controlled, and \
+                 standard deviations state only the agreement between the images; across the track, the adjustment \
+                 departs from Yoon & Shan 2004 (decision 0010)"
                     .to_owned(),
             );
         }
         if self.adjusted.attitude_clock_s.is_some() {
             remarks.push(
                 "positions depend on adjustment.attitude_clock, an interpretation of the disagreement between the \
-                 images that no measurement tests; the report gives the other interpretation beside it"
+                 images that no measurement tests; the report also gives the other interpretation"
                     .to_owned(),
             );
         }
         if matches!(self.adjusted.boresight, Some(Ok(_))) {
             remarks.push(
-                "across-track positions depend on adjustment.common_bus, which assumes that footprints do not carry \
-                 the attitude error of these kernels: footprints computed with the same attitude would agree with \
-                 them whatever its error"
+                "across-track positions depend on adjustment.common_bus, which assumes that footprints do not contain \
+                 the attitude error of these kernels: footprints computed with the same attitude would agree with the \
+                 kernels whatever this error"
                     .to_owned(),
             );
         }
@@ -337,7 +337,7 @@ impl AdjustmentEvidence<'_> {
         let share = limits.rejected_share_max;
         if left_out as f64 > share * ties as f64 && 2 * left_out <= ties {
             remarks.push(format!(
-                "{left_out} of {ties} tie points were rejected by the adjustment; ties.parquet states why"
+                "{left_out} of {ties} tie points were rejected in the adjustment; ties.parquet states the reasons"
             ));
         }
         let taken = self.taken();
@@ -351,8 +351,8 @@ impl AdjustmentEvidence<'_> {
             match found {
                 // Written so that NaN counts.
                 Some(found) if !(found <= limits.sigma0_max) => remarks.push(format!(
-                    "residuals of the tie points {axis} the track are {found:.2} times what adjustment.tie_sigma_px expects: \
-                     measurements are less accurate than configured, or a model does not hold"
+                    "residuals of the tie points {axis} the track are {found:.2} times the value expected from \
+                     adjustment.tie_sigma_px: measurements are less accurate than configured, or a model is incorrect"
                 )),
                 Some(_) => {}
                 None => remarks.push(format!(
@@ -362,15 +362,15 @@ impl AdjustmentEvidence<'_> {
         }
         remarks.extend(self.loose_ties().map(|found| {
             format!(
-                "residuals of tie points along the track are {found:.2} times their standard deviations (by the median): blunders of tie points may \
-                 remain; configure smaller standard deviations"
+                "residuals of tie points along the track are {found:.2} times their standard deviations (median): \
+                 blunders of tie points may remain; configure smaller standard deviations"
             )
         }));
         let scatter_px = self.adjusted.summary.tie_scatter_px;
         if scatter_px > SCATTER_LARGE_PX {
             remarks.push(format!(
-                "tie points scatter by {scatter_px:.1} px in addition to their stated standard deviations, where \
-                 attitude jitter usually causes less than 0.8 px: measurements are less accurate than stated"
+                "tie points scatter by {scatter_px:.1} px in addition to their stated standard deviations; attitude \
+                 jitter usually causes less than 0.8 px: measurements are less accurate than stated"
             ));
         }
         remarks.extend(self.drifts(limits));
@@ -396,7 +396,7 @@ fn heights_beyond(heights: &HeightSummary, terms: &Terms<'_>) -> String {
     };
     format!(
         "{} of {} tie points lie farther from the {} surface than their standard deviations allow{rejected}: \
-         across-track measurement errors shift heights by more than stated; height_check.parquet lists them",
+         across-track measurement errors shift heights by more than stated; height_check.parquet lists these points",
         heights.beyond_limit, heights.compared, terms.altimeter
     )
 }

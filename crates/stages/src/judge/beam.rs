@@ -96,8 +96,8 @@ impl Deviation {
             format!("{:.1} km", ground_m / METRES_PER_KM)
         };
         format!(
-            "{images}: the beam of {} in the {} lies {} mrad {} from its mounting according to {whose}, {ground} \
-             on the ground ({} shots), {limit}",
+            "{images}: according to {whose}, the beam of {} in the {} deviates by {} mrad {} from its mounting, \
+             {ground} on the ground ({} shots), {limit}",
             terms.altimeter,
             terms.shot_source(),
             signed(PER_MILLI * self.angle_rad, 2),
@@ -306,8 +306,8 @@ pub(super) fn invalid_because(evidence: &Evidence<'_>) -> Vec<String> {
             let limit = PER_MILLI * limit_sigma * deviation.sigma_rad;
             deviation.text(
                 &format!(
-                "expected at most {limit:.2} mrad; check the C-kernels, pointing.ck_bias_s, altimeter_clock, and that the shots are \
-                 of this orbit"
+                "expected at most {limit:.2} mrad; check the C-kernels, pointing.ck_bias_s and altimeter_clock, and \
+                 check that the shots belong to this orbit"
                 ),
                 &evidence.terms,
             )
@@ -316,8 +316,8 @@ pub(super) fn invalid_because(evidence: &Evidence<'_>) -> Vec<String> {
     for (image, of, least) in evidence.beam.places() {
         if f64::from(of.inside) < least {
             reasons.push(format!(
-                "image {}: {} of {} simultaneous footprints lie in it according to its orientation, where the mountings of \
-                 camera and laser place all of them, expected at least {least:.0}; check attitude, frames and times",
+                "image {}: its orientation places {} of {} simultaneous footprints inside, and the mountings of camera \
+                 and laser place all of them inside; expected at least {least:.0}: check attitude, frames and times",
                 image.image, of.inside, of.expected_inside
             ));
         }
@@ -327,8 +327,9 @@ pub(super) fn invalid_because(evidence: &Evidence<'_>) -> Vec<String> {
         // Written so that NaN counts.
         if !(apart_m <= limit_m) {
             reasons.push(format!(
-                "image {image}: its support data place the spacecraft {apart_m:.0} m from its position in the {source}, expected \
-                 at most {limit_m:.0} m; check that they belong to this image, and check their frame"
+                "image {image}: the spacecraft position in its support data differs by {apart_m:.0} m from the \
+                 position in the {source}, expected at most {limit_m:.0} m; check that the support data belong to this \
+                 image, and check their frame"
             ));
         }
     }

@@ -161,7 +161,7 @@ fn of_lengths(evidence: &Evidence<'_>) -> [Option<Check>; 2] {
         )
     });
     let untested = (!tested && !profiles.is_empty()).then(|| {
-        let subject = "not tested: no position of the spacecraft";
+        let subject = "not tested: no spacecraft position";
         Check::without_number(CheckKind::RangeMean, subject, Warning)
     });
     [untested, shots]

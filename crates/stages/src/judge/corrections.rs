@@ -95,8 +95,8 @@ impl AdjustmentEvidence<'_> {
         let far = far.filter(|of| !of.is_within(of.multiple * limit));
         let far = far.map(|of| {
             format!(
-                "image {}: the adjustment corrects its {} by {:.1} standard deviations, expected at most {}; check \
-                 its time, its kernels and pointing.ck_bias_s",
+                "image {}: the adjustment corrects its {} by {:.1} standard deviations, expected at most {}; check its \
+                 time and kernels, and pointing.ck_bias_s",
                 of.image,
                 of.unknown.quantity(),
                 of.sigmas,

@@ -35,7 +35,8 @@ pub(super) fn invalid_because(evidence: &Evidence<'_>) -> Option<String> {
     let longest = evidence.longest_profile()?;
     (evidence.is_tested() && !longest.is_judged(limits)).then(|| {
         format!(
-            "no profile is long enough to be judged: the longest whose ranges are tested, {}, has {} shots; limit at least {}",
+            "no profile is long enough to be judged: the longest profile with tested ranges, {}, has {} shots; \
+             expected at least {}",
             longest.profile, longest.shots, limits.shots_min
         )
     })
@@ -59,7 +60,7 @@ pub(super) fn remarks(evidence: &Evidence<'_>) -> Vec<String> {
             )
         };
         remarks.push(format!(
-            "{whose}: the tables contain no position of the spacecraft, and no kernels cover the shots"
+            "{whose}: the tables contain no spacecraft position, and no kernels cover the shots"
         ));
     }
     let short: Vec<&ProfileRanges> = profiles
@@ -71,7 +72,7 @@ pub(super) fn remarks(evidence: &Evidence<'_>) -> Vec<String> {
         let named = short.iter().take(NAMED_MAX).map(|of| &*of.profile);
         let more = if short.len() > NAMED_MAX { ", …" } else { "" };
         remarks.push(format!(
-            "profiles of fewer than {} shots, which are not judged: {} with {shots} shots ({}{more})",
+            "profiles with fewer than {} shots, which are not judged: {} with {shots} shots ({}{more})",
             limits.shots_min,
             short.len(),
             named.collect::<Vec<_>>().join(", ")
@@ -94,14 +95,14 @@ fn far_off(of: &ProfileRanges, limits: &RangeCheckConfig) -> Option<String> {
     } else if of.decoding_m.n == 0 {
         "radii corrected by crossovers"
     } else {
-        "off nadir, where the error of the orbit across the track contributes"
+        "off nadir, where the across-track orbit error contributes"
     };
     let is_open = of.invalid_because.is_empty()
         && (!of.is_judged(limits) || of.mean_max_m(limits) > limits.mean_max_m);
     // Written so that NaN counts.
     (is_open && of.measured() > 0 && !(mean_m.abs() <= limits.mean_max_m)).then(|| {
         format!(
-            "profile {}, {why}: mean of range − distance {} m by {} shots; limit ±{} m",
+            "profile {}, {why}: mean of range − distance {} m from {} shots; limit ±{} m",
             of.profile,
             signed(mean_m, 3),
             of.measured(),

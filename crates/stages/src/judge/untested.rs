@@ -105,7 +105,7 @@ fn small_attitude(evidence: &Evidence<'_>, is_tested: bool) -> Option<Group> {
                 PER_MILLI * along_rad,
                 PER_MILLI * across_rad
             ))
-            .with(format!("the place of a single profile, up to {one_m:.0} m"))
+            .with(format!("an error in the position of a single profile, up to {one_m:.0} m"))
     })
 }
 
@@ -135,12 +135,12 @@ fn images(evidence: &Evidence<'_>) -> [Group; 3] {
     let mut one_label = Group::new("stated by the label alone");
     if has_ties && of_labels.len() > 1 {
         by_ties = by_ties.with(
-            "an error that the start times of all images, or the lines of all tie points, share",
+            "an error common to the start times of all images or to the lines of all tie points",
         );
     } else if !of_labels.is_empty() {
         let labels = listed(&of_labels);
         one_label = one_label.with(format!(
-            "an error that clock and UTC in the label of {labels} share"
+            "an error common to clock and UTC in the label of {labels}"
         ));
     }
     if !has_ties && !endless.is_empty() {
@@ -149,16 +149,16 @@ fn images(evidence: &Evidence<'_>) -> [Group; 3] {
     }
     if has_ties {
         by_ties = by_ties.with(
-            "an error of the focal length, a bend of the detector line, or a distortion of the camera across the track",
+            "an error in the focal length, a bend in the detector line, or a camera distortion across the track",
         );
         if !of_support.is_empty() {
-            by_ties = by_ties
-                .with("an error of the first sample of the detector that support data share");
+            by_ties =
+                by_ties.with("an error in the first detector sample that all support data share");
         }
     } else if !evidence.images.is_empty() {
         without_ties = without_ties
             .with("rotation about the line of sight")
-            .with("focal length, distortion and direction of the samples of the camera")
+            .with("focal length, distortion and sample direction of the camera")
             .with("first sample and summing of the labels");
         if !of_support.is_empty() {
             without_ties = without_ties.with("line times of support data");
@@ -175,8 +175,8 @@ fn shots(evidence: &Evidence<'_>, is_attitude_tested: bool) -> Group {
     }
     if is_attitude_tested {
         group = group.with(
-            "an attitude error that the images share with the footprints, whose files do not state the attitude they were \
-             computed from",
+            "an attitude error that the images share with the footprints, whose files do not state the attitude used \
+             for their computation",
         );
     }
     group
@@ -198,7 +198,7 @@ fn orbit(evidence: &Evidence<'_>) -> Group {
     let group = Group::new("within range_check.orbit_max_m");
     if evidence.footprints.is_some_and(|count| count > 0) {
         group.with(format!(
-            "an error of the orbit along or across the track, up to {} m",
+            "an orbit error along or across the track, up to {} m",
             evidence.range_limits.orbit_max_m
         ))
     } else {

@@ -66,7 +66,7 @@ impl ShownImage {
         };
         (missing > 0 || suspect > 0 || self.complaint_count > 0).then(|| {
             format!(
-                "{missing} of {} lines are missing, {suspect} may be damaged, {first}",
+                "{missing} of {} lines are missing and {suspect} may be damaged; {first}",
                 self.lines
             )
         })

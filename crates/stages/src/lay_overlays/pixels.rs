@@ -94,7 +94,7 @@ impl Patch {
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "a place inside an image, and a mean of bytes"
+        reason = "a position inside an image, and a mean of bytes"
     )]
     pub(super) fn at(&self, line: f64, sample: f64) -> u8 {
         let (top, left) = ((line - 0.5).floor(), (sample - 0.5).floor());

@@ -170,7 +170,7 @@ fn pixel_m(sights: &[Sight]) -> f64 {
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
-    reason = "casts of floats saturate, and the image ends the part"
+    reason = "casts from floating point saturate, and the edges of the image limit the part"
 )]
 fn patch(lattice: &Lattice, times: &ImageTimes) -> Patch {
     let edge = CHIP_EDGE as f64;

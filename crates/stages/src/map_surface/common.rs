@@ -32,15 +32,18 @@ pub(super) enum PairError {
     )]
     NothingInCommon { images: [String; 2] },
     #[error(
-        "images {} and {} look from nearly the same direction: their rays converge by {degrees:.2} degrees, expected at least 0.57",
+        "images {} and {} have nearly the same viewing direction: their rays converge by {degrees:.2} degrees, \
+         expected at least 0.57",
         images[0], images[1]
     )]
     #[cause(like = NothingInCommon)]
     Parallel { images: [String; 2], degrees: f64 },
     #[error(
-        "surface.cell_m is {cell_m}; expected at least {least_m:.1}, a pixel of the coarser image"
+        "surface.cell_m is {cell_m}; expected at least {least_m:.1}, the pixel size of the coarser image"
     )]
-    #[cause("use about three pixels: details smaller than the compared areas are not resolved")]
+    #[cause(
+        "use cells of about three pixels: details smaller than the compared areas are not resolved"
+    )]
     Fine { cell_m: f64, least_m: f64 },
     #[error(
         "surface.cell_m is {cell_m}: the common ground of the images has {cells} cells of this size; expected at most {CELLS_MAX}"
@@ -57,7 +60,7 @@ pub(super) struct Common {
     pub(super) per_cell: usize,
     /// Edge of a pixel of each image on the ground, metres.
     pub(super) pixels_m: [f64; 2],
-    /// Angle between the rays of both images in the middle.
+    /// Angle between the rays of both images in the middle of the common ground.
     pub(super) convergence_rad: f64,
     /// The lesser extent of the common ground, metres.
     width_m: f64,
@@ -136,7 +139,7 @@ impl Common {
         #[allow(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
-            reason = "ratios of pixels are small numbers"
+            reason = "ratios of pixel sizes are small numbers"
         )]
         let halvings = self
             .pixels_m

@@ -122,7 +122,7 @@ fn on_model(
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
-    reason = "places on the grid, where its height is known"
+    reason = "positions on the grid with known heights"
 )]
 fn nearest(grid: &HeightGrid, numbers: &[f32], cell: [f64; 2]) -> Option<f64> {
     let [row, column] = cell.map(|at| at.round().max(0.0) as usize);

@@ -71,7 +71,7 @@ impl JitterAndSmoothing {
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
-    reason = "a few squares of a few cells"
+    reason = "a small number of cells in a few squares"
 )]
 fn smoothing_m2(cells: &[Cell], sizes: Sizes, noise_m2: f64) -> f64 {
     let lags = [2.0, 4.0].map(|squares| (squares * sizes.compared_cells).ceil().max(1.0) as usize);

@@ -122,7 +122,7 @@ fn every_tile(
 /// Heights above the sphere by the altimeter's nearby shots, and their largest standard deviation, metres.
 #[allow(
     clippy::cast_possible_truncation,
-    reason = "heights of a planet keep a millimetre"
+    reason = "planetary heights keep millimetre precision"
 )]
 fn beforehand(level: &Level<'_>, heights: &Heights) -> (Field, f64) {
     let ground = &level.ground;

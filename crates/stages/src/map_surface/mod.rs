@@ -104,10 +104,12 @@ impl Input for AdjustmentOfImages<'_> {
 #[derive(Debug, thiserror::Error, Cause)]
 #[cause(Input)]
 enum SurfaceError {
-    #[error("image {image}: its orientation sees no ground: {unseen}")]
+    #[error("image {image} shows no ground according to its orientation: {unseen}")]
     #[cause("check the kernels and times of the image")]
     Unseen { image: String, unseen: Unseen },
-    #[error("{found} images have pixels; expected two, or their identifiers in surface.images")]
+    #[error(
+        "{found} images have pixels; expected two, or the identifiers of two images in surface.images"
+    )]
     #[cause("name two images with images.pixels in surface.images")]
     NotTwo { found: usize },
 }
@@ -270,7 +272,7 @@ fn surface_of(common: &Common, cells: &[Cell]) -> Surface {
     account.is_refused = !(account.filled > 0 && found_share >= FOUND_SHARE_MIN);
     #[allow(
         clippy::cast_possible_truncation,
-        reason = "heights of a planet keep a millimetre"
+        reason = "planetary heights keep millimetre precision"
     )]
     let numbers = |of: &dyn Fn(&Found) -> f64| -> Vec<f32> {
         let number = |cell: &Cell| match cell {

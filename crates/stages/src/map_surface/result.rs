@@ -50,7 +50,7 @@ pub struct SurfaceAccount {
     pub is_refused: bool,
     /// Angle between the rays of both images in the middle, radians.
     pub convergence_rad: f64,
-    /// Metres of height for a pixel of parallax, of the coarser image.
+    /// Height per pixel of parallax in the coarser image, metres.
     pub height_of_pixel_m: f64,
     /// Root mean square of the standard deviations of all heights about the common error, metres.
     pub sigma_m: f64,
@@ -113,9 +113,10 @@ pub struct ShotOnSurface {
 pub struct ProfileOnSurface {
     /// Its identifier.
     pub profile: String,
-    /// Standard deviation of the height of all its shots due to its attitude, metres: 0 at nadir where the attitude is known.
+    /// Standard deviation of the heights of all shots of the profile due to attitude errors, metres: 0 at nadir where the
+    /// attitude is known.
     pub attitude_sigma_m: f64,
-    /// Heights of its shots minus the heights of the model, metres.
+    /// Heights of the profile's shots minus heights of the terrain model, metres.
     pub above_m: Summary,
 }
 
@@ -178,7 +179,7 @@ impl SurfaceModel {
         }
         #[allow(
             clippy::cast_possible_truncation,
-            reason = "heights of a planet keep a millimetre"
+            reason = "planetary heights keep millimetre precision"
         )]
         let mean = |of: usize, root: fn(f64) -> f64| -> Vec<f32> {
             // A cell without a number has 0/0.

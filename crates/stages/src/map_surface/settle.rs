@@ -84,7 +84,7 @@ struct Slopes {
 impl Slopes {
     #[allow(
         clippy::cast_possible_truncation,
-        reason = "slopes of bytes keep their digits"
+        reason = "slopes of bytes keep their precision"
     )]
     fn of(numbers: Vec<f32>, width: usize, axes: &Matrix2<f64>) -> Self {
         let axes = axes.map(|axis| axis as f32);

@@ -54,7 +54,7 @@ pub(super) fn without_strays(cells: &[Cell], size: [usize; 2], sample_m: f64) ->
 /// none was found.
 #[allow(
     clippy::cast_possible_truncation,
-    reason = "heights of a planet keep a millimetre"
+    reason = "planetary heights keep millimetre precision"
 )]
 pub(super) fn field(
     cells: &[Cell],

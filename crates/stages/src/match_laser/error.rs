@@ -17,10 +17,12 @@ pub enum MatchError {
     },
     /// No shot lies on the model.
     #[error(
-        "no shot lies on {ground}, which reaches from {west:.3} to {east:.3} degrees east and from {south:.3} to {north:.3} degrees of latitude"
+        "no shot lies on {ground}, which extends from {west:.3} to {east:.3} degrees of east longitude and from \
+         {south:.3} to {north:.3} degrees of latitude"
     )]
     #[cause(
-        "name PEDR files of passes over it, and check its position: longitudes are east, latitudes areocentric"
+        "name PEDR files of passes over this ground, and check its coordinates: longitudes are positive east, \
+         latitudes areocentric"
     )]
     NoShots {
         /// The ground.

@@ -74,15 +74,15 @@ pub(super) fn judge(of: &Evidence<'_>) -> Verdict {
     let (mut reasons, mut remarks) = (Vec::new(), Vec::new());
     if kept < UNITS_MIN {
         reasons.push(format!(
-            "{kept} of {} units are kept; expected at least {UNITS_MIN}: see the reasons of the others",
+            "{kept} of {} units are kept; expected at least {UNITS_MIN}: see the reasons for the rejection of the other units",
             of.units.len()
         ));
     }
     let matching = of.matching;
     if (kept as f64) < AGREE_MIN * matching as f64 {
         reasons.push(format!(
-            "{kept} of {matching} matching units agree with each other; expected at least half: the others match by \
-             chance, and the former may do so as well"
+            "{kept} of {matching} matching units agree with each other; expected at least half: the other units match \
+             by chance, and the agreeing units may also match by chance"
         ));
     }
     if let Some(held_out) = &of.held_out
@@ -108,7 +108,7 @@ pub(super) fn judge(of: &Evidence<'_>) -> Verdict {
     }
     if of.complaints > 0 {
         remarks.push(format!(
-            "records and points left out, with reasons: {}",
+            "records and points skipped or rejected, with reasons: {}",
             of.complaints
         ));
     }
@@ -159,8 +159,8 @@ fn scattered(widened: Widened) -> Option<String> {
     let Widened { shift, bias } = widened;
     (shift.max(bias) > WIDENED_MAX).then(|| {
         format!(
-            "units scatter more than their shots predict, shifts {shift:.1} times and biases {bias:.1} times: the shots of a unit share \
-             an error of the model; standard deviations are widened by these factors"
+            "units scatter more than their shots predict (shifts {shift:.1} times, biases {bias:.1} times): the shots \
+             of a unit share a model error; standard deviations are multiplied by these factors"
         )
     })
 }
@@ -168,12 +168,12 @@ fn scattered(widened: Widened) -> Option<String> {
 /// Reason and remark on a bias.
 fn bias([bias_m, limit_m]: [f64; 2], of: &Evidence<'_>) -> (Option<String>, Option<String>) {
     let lies =
-        format!("the bias of the model is {bias_m:.0} m (median over all units, by correlation)");
+        format!("the bias of the model is {bias_m:.0} m (median over all units, from correlation)");
     let [apart_m, near_m] = SPHERES_M;
     if !of.radius_is_stated && (bias_m.abs() - apart_m).abs() <= near_m {
         let wrong = format!(
-            "{lies}: the spheres of 3396000 m and 3396190 m, both in use as references of heights of Mars, differ by as much; \
-             state the sphere with --radius-m"
+            "{lies}: the spheres of 3396000 m and 3396190 m, both in use as height references for Mars, differ by this \
+             amount; state the sphere with --radius-m"
         );
         return (Some(wrong), None);
     }
@@ -181,8 +181,8 @@ fn bias([bias_m, limit_m]: [f64; 2], of: &Evidence<'_>) -> (Option<String>, Opti
     match of.similarity {
         Similarity::Ccc if is_beyond => {
             let wrong = format!(
-                "{lies}, and concordance does not remove it: beyond {limit_m:.0} m it displaces shifts; check the reference sphere \
-                 of the heights, or use --similarity auto"
+                "{lies}, and concordance does not remove it: a bias beyond {limit_m:.0} m displaces shifts; check the \
+                 reference sphere of the heights, or use --similarity auto"
             );
             (Some(wrong), None)
         }

@@ -74,11 +74,12 @@ pub struct ModelMatch {
 /// Too little laser control was found.
 #[derive(Debug, thiserror::Error, Cause)]
 #[error(
-    "{used} of {} units of laser shots match the terrain model of the images, and {judging} of {} withheld units; expected at least \
-     {CONTROLS_MIN} of each. {example}", of[0], of[1]
+    "{used} of {} units of laser shots and {judging} of {} withheld units match the terrain model of the images; \
+     expected at least {CONTROLS_MIN} of each. {example}", of[0], of[1]
 )]
-#[cause(Input: "check that cameras.pixels are not exchanged and laser.files are passes over this ground with relief; \
-    give more passes, or a larger laser.search_cells if orbit and mounting are farther off")]
+#[cause(Input: "check that cameras.pixels are not exchanged and that laser.files contain passes over this ground, \
+    which must have relief; give more passes, or a larger laser.search_cells if errors of orbit and mounting are \
+    larger")]
 struct FewUnits {
     used: usize,
     judging: usize,

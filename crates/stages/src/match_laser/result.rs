@@ -25,7 +25,7 @@ pub struct MatchOptions {
     pub similarity: Option<Similarity>,
     /// Shifts are searched within this many cells.
     pub search_cells: u32,
-    /// Similarity that a unit must exceed.
+    /// Similarity to the terrain model that a unit of shots must exceed.
     pub least_score: f64,
     /// Ratio of the best similarity to the mean of those above 0 that a unit must exceed.
     pub least_contrast: f64,

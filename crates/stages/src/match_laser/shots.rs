@@ -59,7 +59,7 @@ impl Shot {
     /// Whether it lies on withheld ground.
     #[allow(
         clippy::cast_possible_truncation,
-        reason = "rectangles of a planet are some thousands"
+        reason = "a planet has a few thousand rectangles"
     )]
     pub(super) fn is_held_back(&self, held_back: Option<HeldBackGround>) -> bool {
         let Some(HeldBackGround { every, seed }) = held_back else {

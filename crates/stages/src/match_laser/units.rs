@@ -118,7 +118,7 @@ impl<'a> Unit<'a> {
             return format!("{} shots; expected more than {POINTS_MIN}", result.shots);
         }
         if result.strips < STRIPS_MIN {
-            return format!("shots of one pass; expected {STRIPS_MIN} or more");
+            return format!("shots of only one pass; expected {STRIPS_MIN} passes or more");
         }
         let Some(mut best) = find(grid, &self.used, measure, options.search_cells) else {
             return "the model has no heights, or no relief, around its shots".to_owned();
@@ -137,7 +137,7 @@ impl<'a> Unit<'a> {
         let wrong = [
             (
                 best.at_border,
-                "its best shift is at the border of the search, or of the model".to_owned(),
+                "its best shift is at the edge of the search area or of the model".to_owned(),
             ),
             (
                 !(best.score > options.least_score),
@@ -156,7 +156,8 @@ impl<'a> Unit<'a> {
             (
                 !is_one_relief(&at_best),
                 format!(
-                    "heights vary by {model_m:.3} m in the model and by {laser_m:.1} m by the laser: expected heights in metres"
+                    "heights vary by {model_m:.3} m in the model and by {laser_m:.1} m according to the laser; \
+                     expected heights in metres"
                 ),
             ),
         ];
@@ -270,7 +271,7 @@ pub(super) fn refuse_lonely(units: &mut [UnitResult], search_cells: u32) -> usiz
         let [east, north] = [0, 1].map(|axis| found.shift_cells[axis] - median[axis]);
         if !(east.hypot(north) < most) {
             unit.refused_because = format!(
-                "its shift is {:.0} cells from the median of all units; expected less than {most:.1}",
+                "its shift differs by {:.0} cells from the median of all units; expected less than {most:.1}",
                 east.hypot(north)
             );
         }

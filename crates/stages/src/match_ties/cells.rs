@@ -88,7 +88,7 @@ impl Common {
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "ratios of pixels are small numbers"
+        reason = "ratios of pixel sizes are small numbers"
     )]
     pub(super) fn levels(&self) -> [usize; 2] {
         let [here, there] = self.spacing_m.map(|spacing| (spacing.x * spacing.y).sqrt());
@@ -176,7 +176,7 @@ pub(super) fn places(cells: &[Cell], pixels: &Pyramid, level: usize) -> Result<V
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "a share of a length"
+        reason = "a share of a number of elements"
     )]
     let quiet = noise.get((QUIET_SHARE * noise.len() as f64) as usize);
     let quiet = quiet.copied().unwrap_or_default();

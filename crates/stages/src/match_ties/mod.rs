@@ -83,7 +83,7 @@ impl Input for TiesOfFiles<'_> {
 #[derive(Debug, thiserror::Error, Cause)]
 #[cause(Input)]
 enum MatchError {
-    #[error("image {image}: its orientation sees no ground: {unseen}")]
+    #[error("image {image} shows no ground according to its orientation: {unseen}")]
     #[cause("check that the site's images overlap, and check their kernels and times")]
     Unseen { image: String, unseen: Unseen },
     #[error("no two images with pixels show the same ground according to their orientation")]
@@ -91,8 +91,8 @@ enum MatchError {
     NothingInCommon,
     #[error("no tie point was found: {0}")]
     #[cause(
-        "check that images.pixels belong to these images, and that both show the same ground; if the orientation \
-         errors exceed the margin, check start times, or give larger standard deviations in [adjustment]"
+        "check that images.pixels belong to these images and show the same ground; if orientation errors exceed the \
+         search margin, check start times, or give larger standard deviations in [adjustment]"
     )]
     NothingMatched(String),
 }
@@ -221,8 +221,8 @@ fn remarks<'a>(pair: &MatchedPair, name: impl Fn(usize) -> &'a str) -> Vec<Strin
     let mut remarks = Vec::new();
     if pair.is_refused {
         remarks.push(format!(
-            "images {first} and {second}: {} of {} places are found within {:.0} m of their expected positions, too few to be \
-             significant; none is used ({})",
+            "images {first} and {second}: {} of {} cells match within {:.0} m of their expected positions, too few to \
+             be significant; none is used ({})",
             pair.ties,
             pair.cells,
             pair.reach_m,
@@ -232,7 +232,7 @@ fn remarks<'a>(pair: &MatchedPair, name: impl Fn(usize) -> &'a str) -> Vec<Strin
     }
     if pair.ties < FEW_TIES {
         remarks.push(format!(
-            "images {first} and {second}: {} of {} places are found ({})",
+            "images {first} and {second}: only {} of {} cells match ({})",
             pair.ties,
             pair.cells,
             pair.reasons()

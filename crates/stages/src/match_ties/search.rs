@@ -281,7 +281,7 @@ fn margins(
 
 #[allow(
     clippy::cast_possible_truncation,
-    reason = "too large a number saturates"
+    reason = "a number that is too large saturates"
 )]
 fn pixel(coordinate: f64) -> i64 {
     coordinate.floor() as i64

@@ -25,8 +25,8 @@ pub(super) enum TiesError {
     #[error("tie points are measured in {found}; expected images of the site: {expected}")]
     #[cause("set images.serial_number of each image to its name in the file")]
     NoImage { found: String, expected: String },
-    #[error("tie points: {0}; expected at most half of the points at such positions")]
-    #[cause("each image position belongs to one tie point: check how the table was made")]
+    #[error("tie points: {0}; expected at most half of the points at shared positions")]
+    #[cause("each image position belongs to one tie point: check the source of the table")]
     SharedPlaces(SharedPlaces),
     #[error("{0}")]
     #[cause(

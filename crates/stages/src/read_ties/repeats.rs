@@ -17,7 +17,7 @@ type Place = (usize, i64, i64);
 fn place(measure: &TieMeasure) -> Place {
     #[allow(
         clippy::cast_possible_truncation,
-        reason = "too large a number saturates"
+        reason = "a number that is too large saturates"
     )]
     let [line, sample] =
         [measure.line, measure.sample].map(|edge| (edge / PLACE_PX).round() as i64);

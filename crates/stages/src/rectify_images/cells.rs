@@ -176,7 +176,7 @@ impl Cells {
 /// Heights of the cells of a tile, NaN where there is none.
 #[allow(
     clippy::cast_possible_truncation,
-    reason = "heights of a planet keep a millimetre"
+    reason = "planetary heights keep millimetre precision"
 )]
 fn heights_m(shown: &HeightGrid, map: &HeightGrid, tile: &Tile) -> Vec<f32> {
     let mut heights_m = Vec::with_capacity(tile.size[0] * tile.size[1]);
@@ -194,7 +194,7 @@ fn heights_m(shown: &HeightGrid, map: &HeightGrid, tile: &Tile) -> Vec<f32> {
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
-    reason = "clamped to the numbers of a byte"
+    reason = "clamped to the range of a byte"
 )]
 fn byte(number: f32) -> u8 {
     number.round().clamp(1.0, 255.0) as u8

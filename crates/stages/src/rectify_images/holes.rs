@@ -100,7 +100,7 @@ fn changes_m(grid: &HeightGrid) -> BTreeMap<usize, f32> {
         }
         #[allow(
             clippy::cast_possible_truncation,
-            reason = "seven digits of a standard deviation"
+            reason = "a standard deviation needs at most seven digits"
         )]
         let change_m = (square / f64::from(count.max(1))).sqrt() as f32;
         (distance, change_m)

@@ -100,7 +100,7 @@ pub struct OrthoimageAccount {
     pub pixel_m: f64,
     /// Number of cells with a brightness.
     pub filled: u32,
-    /// Number of cells on the terrain model whose pixels are missing.
+    /// Number of cells on the terrain model without image pixels.
     pub without_pixels: u32,
     /// Number of terrain cells inside the image, including interpolated holes.
     pub terrain_cells: u32,
@@ -134,16 +134,20 @@ pub struct OrthoimageLook {
 #[derive(Debug, thiserror::Error, Cause)]
 #[cause(Input)]
 enum RectifyError {
-    #[error("image {image}: its rays do not intersect the ground: {unseen}")]
+    #[error("image {image}: its rays do not intersect the ground ({unseen})")]
     #[cause("check the kernels and times of the image")]
     Unseen { image: String, unseen: Unseen },
     #[error("surface.orthoimage_cell_m is {cell_m} m: no cell of this size lies in an image")]
-    #[cause("decrease surface.orthoimage_cell_m; the ground size of an image pixel is usual")]
+    #[cause(
+        "decrease surface.orthoimage_cell_m; a usual value is the ground size of an image pixel"
+    )]
     Empty { cell_m: f64 },
     #[error(
         "image {image}: surface.orthoimage_cell_m is {cell_m} m and requires {cells} cells; expected at most {CELLS_MAX}"
     )]
-    #[cause("increase surface.orthoimage_cell_m; the ground size of an image pixel is usual")]
+    #[cause(
+        "increase surface.orthoimage_cell_m; a usual value is the ground size of an image pixel"
+    )]
     TooLarge {
         image: String,
         cell_m: f64,

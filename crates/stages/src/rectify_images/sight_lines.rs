@@ -100,7 +100,7 @@ impl SightLines {
         let cells = self.rays.iter().zip(heights_m);
         #[allow(
             clippy::cast_possible_truncation,
-            reason = "seven digits of a standard deviation"
+            reason = "a standard deviation needs at most seven digits"
         )]
         let sigma_m = |(ray, height_m): (&Option<Ray>, &f32)| match ray {
             Some(ray) if !ray.is_hidden => {
@@ -158,7 +158,7 @@ fn ray(view: &View<'_>, grid: &HeightGrid, cell: [usize; 2], highest_m: f64) -> 
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
-    reason = "a cast from floating point saturates, and the grid ends long before"
+    reason = "a cast from floating point saturates far beyond the edge of the grid"
 )]
 fn steps(displacement: f64, climb_m: f64, cell_m: f64) -> u32 {
     if displacement > STEEP {
@@ -171,7 +171,7 @@ fn steps(displacement: f64, climb_m: f64, cell_m: f64) -> u32 {
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
-    reason = "whole numbers of a grid"
+    reason = "integer coordinates of a grid"
 )]
 fn cell_index(grid: &HeightGrid, [row, column]: [f64; 2]) -> Option<usize> {
     let at = row as usize * grid.size[1] + column as usize;

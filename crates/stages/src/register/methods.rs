@@ -19,13 +19,14 @@ use areograph_geom::{
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// The image as a frame with the orientation of the current line (Konecny et al. 1987, Wang 1990).
+    /// Iteration that treats the image as a frame with the orientation of the current line (Konecny et al. 1987, Wang
+    /// 1990).
     FrameFirst,
-    /// Eq. 4 of Shan et al. 2005.
+    /// Iteration of equation 4 of Shan et al. 2005.
     FixedPoint,
 }
 
-/// One iteration with one model on all points within the image's lines.
+/// Results of one iteration with one model for all points within the lines of the image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MethodRun {
     /// The iteration.
@@ -33,15 +34,16 @@ pub struct MethodRun {
     /// Order of the orientation polynomials: first as in Shan, Lee & Yoon 2002, or second as in Shan et al. 2005.
     #[schemars(extend("enum" = ["first_order", "second_order"]))]
     pub model: CameraModel,
-    /// Points that were tried.
+    /// Number of points that were tried.
     pub points: u64,
-    /// Points without a result, by reason.
+    /// Numbers of points without a result, by reason.
     pub rejected: BTreeMap<String, u64>,
-    /// Evaluations of the iteration's formula until it ended, over the points with a result.
+    /// Number of evaluations of the iteration formula per point with a result.
     pub evaluations: Summary,
-    /// Line found minus the one of Newton's method with the same model.
+    /// Line from this iteration minus line from Newton's method with the same model.
     pub difference_lines: Summary,
-    /// Mean |step| of each iteration over the points with a result, lines; a point that has ended counts as 0.
+    /// Mean |step| of each iteration over the points with a result, lines; a point whose iteration has ended counts as
+    /// 0.
     #[schemars(transform = none_negative)]
     pub mean_step_lines: Vec<f64>,
 }

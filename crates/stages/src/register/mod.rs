@@ -77,14 +77,14 @@ impl ImageRegistration {
     }
 }
 
-/// Differences of another model of the same image at the same points.
+/// Differences between another model and the production model of the same image at the same points.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ModelDifference {
     /// The other model.
     pub model: CameraModel,
-    /// Its line minus the line of the production model.
+    /// Line of the other model minus line of the production model.
     pub lines: Summary,
-    /// Its sample minus the sample of the production model.
+    /// Sample of the other model minus sample of the production model.
     pub samples: Summary,
 }
 

@@ -43,7 +43,7 @@ columns! {
     line: f64,
     /// Sample coordinate: 0 at the outer edge of the first pixel, 0.5 at its centre.
     sample: f64,
-    /// Lines from the middle of the header image.
+    /// Line offset from the middle of the header image, lines.
     line_offset: f64,
     /// Across-track focal-plane coordinate from the boresight, image pixels (against the samples).
     y_px: f64,

@@ -15,7 +15,7 @@ pub(super) fn findings(
         format!("complaints about records of shots: {said}, the first: {complaint}")
     });
     let spoiled = (spoiled_shots > 0).then(|| {
-        format!("shots in the windows omitted because of invalid values: {spoiled_shots}")
+        format!("shots in the windows rejected because of invalid values: {spoiled_shots}")
     });
     first.into_iter().chain(spoiled).collect()
 }

@@ -12,11 +12,11 @@ use areograph_pds::archive::Seen;
 /// Two files with the same shots, of which neither is a copy of the other.
 #[derive(Debug, thiserror::Error, Cause)]
 #[error(
-    "holds {shots} shot(s) in the windows that {other} holds as well, the first in record {record} \
-     (there in record {other_record}, orbit {orbit}) at {at}"
+    "contains {shots} shot(s) in the windows that {other} also contains, the first in record {record} (record \
+     {other_record} in the other file, orbit {orbit}) at {at}"
 )]
-#[cause(Input: "name only one of the two in pedr.files: every shot counts once, and areograph cannot decide which \
-    version of an orbit is meant")]
+#[cause(Input: "name only one of the two files in pedr.files: every shot counts once, and areograph cannot decide \
+    which version of an orbit is intended")]
 struct SharedShots {
     shots: usize,
     other: String,

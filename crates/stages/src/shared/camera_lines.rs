@@ -121,9 +121,12 @@ impl Input for &LinePixels {
 
 /// Pixels of another image.
 #[derive(Debug, thiserror::Error, Cause)]
-#[cause(Input: "check that cameras.pixels are not exchanged, and are the whole images that cameras.isd describe")]
+#[cause(Input: "check that cameras.pixels are not exchanged and contain the complete images that cameras.isd describe")]
 enum PixelsError {
-    #[error("camera {camera}: its pixels have {} lines of {} samples; expected {} of {}, as in its support data", found[0], found[1], expected[0], expected[1])]
+    #[error(
+        "camera {camera}: its pixel file has {} lines of {} samples; expected {} of {}, as in its support data",
+        found[0], found[1], expected[0], expected[1]
+    )]
     Size {
         camera: String,
         found: [u32; 2],

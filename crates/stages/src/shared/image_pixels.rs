@@ -104,10 +104,10 @@ impl PixelFiles<'_> {
 #[cause(Input)]
 enum PixelsError {
     #[error(
-        "image {image}: its pixels are those of product {product}; expected {expected}, which its identifier names"
+        "image {image}: its pixels belong to product {product}; expected {expected}, which the image identifier names"
     )]
     #[cause(
-        "check that images.pixels are not exchanged, and are all of the image; and its lines_delivered, if it is given"
+        "check that images.pixels are not exchanged and contain the complete image; check lines_delivered if it is given"
     )]
     Product {
         image: String,
@@ -118,7 +118,7 @@ enum PixelsError {
         "image {image}: the exposure of its pixels begins at clock {clock}; expected {expected}, the clock of the image"
     )]
     #[cause(
-        "check that images.pixels are not exchanged, and the clock of the image's label or keys"
+        "check that images.pixels are not exchanged; check the clock in the label or keys of the image"
     )]
     Clock {
         image: String,
@@ -126,10 +126,10 @@ enum PixelsError {
         expected: String,
     },
     #[error(
-        "image {image}: its pixels are those of camera {found}; expected {expected}, the camera of the image"
+        "image {image}: its pixels belong to camera {found}; expected {expected}, the camera of the image"
     )]
     #[cause(
-        "check that images.pixels are not exchanged, and the label or the exposures of the image"
+        "check that images.pixels are not exchanged; check the label or the exposures of the image"
     )]
     Camera {
         image: String,
@@ -147,30 +147,30 @@ enum PixelsError {
         expected_s: f64,
     },
     #[error("image {image}: its pixels are map-projected; expected the unprojected image")]
-    #[cause("give the unprojected cube, or the file of the archive (.imq, .img)")]
+    #[cause("give the unprojected cube, or the archive file (.imq, .img)")]
     Map { image: String },
     #[error(
-        "images {} and {}: the pixels of both are {} lines of {} samples, without a label that identifies the image; \
-         expected a label in one of them",
+        "images {} and {}: both pixel files have {} lines of {} samples, without a label that identifies the image; \
+         expected a label in one of the files",
         images[0], images[1], size[0], size[1]
     )]
     #[cause(
-        "give the file of the archive (.imq, .img) or the cube of ISIS for one of the images: without it exchanged \
-         images cannot be distinguished from orientation errors"
+        "give the archive file (.imq, .img) or the ISIS cube for one of the images: without a label, exchanged images \
+         cannot be distinguished from orientation errors"
     )]
     Alike { images: [String; 2], size: [u32; 2] },
     #[error(
         "image {image}: label and pixels of one file contradict each other: {first} ({count} contradictions in all)"
     )]
     #[cause(
-        "fetch the file again with label and pixels in one file: one of them may belong to another image"
+        "fetch the file again, with label and pixels in one file: the label or the pixels may belong to another image"
     )]
     Contradiction {
         image: String,
         first: String,
         count: usize,
     },
-    #[error("image {image}: its pixels have {found} {what}; expected {expected}")]
+    #[error("image {image}: its pixel file has {found} {what}; expected {expected}")]
     #[cause(like = Product)]
     Size {
         image: String,
@@ -213,9 +213,9 @@ fn belongs(file: &PixelFile, times: &ImageTimes) -> std::result::Result<(), Pixe
         of_the_image(label, times)?;
     } else if ![delivered, header].contains(&lines) {
         let expected = if delivered == header {
-            format!("{header}, as there is no label")
+            format!("{header}, because there is no label")
         } else {
-            format!("{delivered} or {header}, as there is no label")
+            format!("{delivered} or {header}, because there is no label")
         };
         return Err(size("lines", lines, expected));
     }
@@ -240,7 +240,9 @@ fn belongs(file: &PixelFile, times: &ImageTimes) -> std::result::Result<(), Pixe
         return Err(size(
             "lines",
             lines,
-            format!("at most {delivered}, the lines received of {header} (lines_delivered)"),
+            format!(
+                "at most {delivered}, the number of lines received of {header} (lines_delivered)"
+            ),
         ));
     }
     Ok(())

@@ -33,7 +33,7 @@ pub struct LineCamera {
 /// Support data that do not form an orientation.
 #[derive(Debug, thiserror::Error, Cause)]
 #[error("image {image}: {problem}")]
-#[cause(Input: "check the support data: they must be those of an image that sees the ground")]
+#[cause(Input: "check that the support data belong to an image that shows the ground")]
 pub(crate) struct NoSight {
     pub(crate) image: String,
     pub(crate) problem: String,

@@ -33,7 +33,7 @@ pub struct OrientedImage<'a> {
 /// Samples that do not form an orientation.
 #[derive(Debug, thiserror::Error, Cause)]
 #[error("image {image}: {error}")]
-#[cause(Input: "raise orientation.intervals, and check the kernels of the image's time")]
+#[cause(Input: "increase orientation.intervals, and check the kernels at the time of the image")]
 struct NoOrientation {
     image: String,
     error: SamplesError,

@@ -111,7 +111,7 @@ enum TabulateError {
     Samples { image: String, source: SamplesError },
     #[error("read back differently: {what}")]
     #[cause(
-        "check the disk and run again; if it happens again, report it with the site's configuration"
+        "check the disk and run again; if the error persists, report it with the site's configuration"
     )]
     ReadBack { what: String },
 }

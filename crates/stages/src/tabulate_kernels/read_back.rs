@@ -51,7 +51,7 @@ pub fn require_same(
         return Ok(());
     }
     let what = format!(
-        "image {}: positions {distance_m:.1e} m and rotations {turn_rad:.1e} rad apart; expected at most \
+        "image {}: positions differ by {distance_m:.1e} m and rotations by {turn_rad:.1e} rad; expected at most \
          {POSITION_TOLERANCE_M} m and {ROTATION_TOLERANCE_RAD} rad",
         image.id
     );

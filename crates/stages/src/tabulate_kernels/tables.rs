@@ -222,7 +222,7 @@ impl Source<'_> {
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
-    reason = "paddings have some dozens of steps"
+    reason = "padding has a few dozen steps"
 )]
 fn steps_beyond(end: Et, limit: Et, step_s: f64) -> impl Iterator<Item = Et> {
     let length_s = limit.since(end);

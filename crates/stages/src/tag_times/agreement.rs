@@ -66,11 +66,11 @@ impl From<String> for Disagreement {
 #[cause(Input)]
 pub(super) enum Contradiction {
     #[error(
-        "image {image}: the {source_is} of product {product}; expected {expected}, which its identifier names"
+        "image {image}: the {source_is} product {product}; expected {expected}, which the image identifier names"
     )]
     #[cause(
         "check that labels or support data are not exchanged; an identifier that names no product is valid with any of \
-         them"
+         these"
     )]
     Product {
         image: String,
@@ -79,10 +79,10 @@ pub(super) enum Contradiction {
         expected: String,
     },
     #[error(
-        "image {image}: the clock of serial number {serial} differs from {sclk}; expected agreement within {TOLERANCE_S} s"
+        "image {image}: the clock in serial number {serial} differs from {sclk}; expected agreement within {TOLERANCE_S} s"
     )]
     #[cause(
-        "check that labels or serial numbers are not exchanged; ISIS writes the clock of the label into the latter"
+        "check that labels or serial numbers are not exchanged; ISIS writes the clock of the label into the serial number"
     )]
     Serial {
         image: String,
@@ -93,8 +93,8 @@ pub(super) enum Contradiction {
         "image {image}: clock {sclk} is {apart_s:.3} s away from UTC {utc}; expected at most {TOLERANCE_S} s"
     )]
     #[cause(
-        "check which of the two belongs to this image, and that no leap second before it is missing in the kernels; \
-         the run would use the clock"
+        "check which of the two belongs to this image, and check that the kernels contain all leap seconds before this \
+         image; the run would use the clock"
     )]
     Start {
         image: String,
@@ -103,7 +103,7 @@ pub(super) enum Contradiction {
         apart_s: f64,
     },
     #[error(
-        "image {image}: the first of its exposures begins {apart_s:.3} s away from its {stated}; expected at most \
+        "image {image}: its first exposure begins {apart_s:.3} s away from its {stated}; expected at most \
          {TOLERANCE_S} s"
     )]
     #[cause("check which of the two belongs to this image: the run would use the exposures")]
@@ -114,10 +114,10 @@ pub(super) enum Contradiction {
     },
     #[error(
         "image {image}: STOP_TIME {stop} is {after_s:.3} s after the start, but its lines take {duration_s:.3} s; \
-         expected them to agree"
+         expected agreement"
     )]
     #[cause(
-        "check start and stop time, lines, exposure and downtrack summing; one of them belongs to another image"
+        "check start and stop time, lines, exposure and downtrack summing; one of these values belongs to another image"
     )]
     Stop {
         image: String,
@@ -230,7 +230,7 @@ pub(super) fn pieces_agree(
     let ground_m = apart_s * GROUND_SPEED_M_S;
     Ok((apart_s > close_s).then(|| Disagreement {
         text: format!(
-            "the first of its exposures begins {apart_s:.3} s away from {stated}, {} on the ground; the exposures are used",
+            "its first exposure begins {apart_s:.3} s away from {stated}, {} on the ground; the exposures are used",
             ground(ground_m)
         ),
         ground_m,
@@ -244,7 +244,7 @@ pub(super) fn piece_follows(piece: &LinePiece, next: &LinePiece) -> Option<Strin
     // Written so that NaN is reported.
     (!(pause_s <= 0.5 * piece.period_s)).then(|| {
         format!(
-            "no line is exposed for {pause_s:.4} s, {:.1} lines, before line {}; a first line or a start of its \
+            "no line is exposed for {pause_s:.4} s ({:.1} lines) before line {}; a first line or a start in its \
              exposures may be wrong",
             pause_s / piece.period_s,
             next.first_line
@@ -288,8 +288,8 @@ pub(super) fn stop_agrees(
     };
     Ok(Some(Disagreement {
         text: format!(
-            "STOP_TIME {utc} is {after_s:.3} s after the start, but {lines} lines of {:.4} ms take {duration_s:.3} s, {} on the \
-             ground; lines, exposure or summing may not be those of the image",
+            "STOP_TIME {utc} is {after_s:.3} s after the start, but {lines} lines of {:.4} ms take {duration_s:.3} s, \
+             {} on the ground; lines, exposure or summing may belong to another image",
             line_period_s / SECONDS_PER_MS,
             ground(apart_s * GROUND_SPEED_M_S)
         ),
@@ -403,16 +403,16 @@ mod tests {
 
     #[test]
     fn identifier_and_serial_number_are_those_of_the_label() {
-        let label = ("label is that", Some("E02/02016"));
+        let label = ("label belongs to", Some("E02/02016"));
         for id in ["E02-02016", "e0202016_part", "nadir"] {
             assert!(of_one_product(&image(id, None), label).is_ok(), "{id}");
         }
-        assert!(of_one_product(&image("E02-01301", None), ("label is that", None)).is_ok());
+        assert!(of_one_product(&image("E02-01301", None), ("label belongs to", None)).is_ok());
         assert_eq!(
             of_one_product(&image("E02-01301", None), label)
                 .unwrap_err()
                 .to_string(),
-            "image E02-01301: the label is that of product E02/02016; expected E0201301, which its identifier names"
+            "image E02-01301: the label belongs to product E02/02016; expected E0201301, which the image identifier names"
         );
         let clock = Some("669788295:103");
         for serial in [

@@ -9,9 +9,9 @@ use areograph_base::{
 #[derive(Debug, thiserror::Error, Cause)]
 #[cause(Input)]
 enum DetectorError {
-    #[error("image {image}: {key} is {summing}; expected 1 to {max}, as {instrument} sums")]
+    #[error("image {image}: {key} is {summing}; expected 1 to {max} for {instrument}")]
     #[cause(
-        "check summing, samples and first detector, and check that the image is of this camera"
+        "check summing, samples and first detector, and check that this camera exposed the image"
     )]
     Summing {
         image: String,
@@ -21,18 +21,18 @@ enum DetectorError {
         max: u32,
     },
     #[error(
-        "image {image}: crosstrack_summing {code} of {instrument} denotes summing that varies over the line; \
-         expected one summing for all samples"
+        "image {image}: crosstrack_summing {code} of {instrument} denotes summing that varies over the line; expected \
+         the same summing for all samples"
     )]
-    #[cause("leave the image out: its samples differ in width, which areograph does not model")]
+    #[cause("omit the image: its samples differ in width, which areograph does not model")]
     VariableSumming {
         image: String,
         code: u32,
         instrument: String,
     },
     #[error(
-        "image {image}: {samples} samples of {crosstrack} pixels from pixel {first} end at {end}; expected at most \
-         {pixels}, the pixels of {instrument}"
+        "image {image}: {samples} samples of {crosstrack} pixels from pixel {first} end at pixel {end}; expected at \
+         most {pixels}, the number of pixels of {instrument}"
     )]
     #[cause(like = Summing)]
     Detector {

@@ -16,15 +16,15 @@ pub(super) enum ImageError {
         "image {0}: the label states no line times, because the image file contains them beside each line; expected line times"
     )]
     #[cause(
-        "give the file of the archive, label and rows in one, as images.label; or the pieces of its line times as \
+        "give the archive file, with label and rows in one file, as images.label, or the pieces of the line times as \
          images.exposures"
     )]
     NoLineTimes(String),
     #[error(
-        "image {image}: lines_header is {stated}, but the file of its label has {found} lines; expected them to agree"
+        "image {image}: lines_header is {stated}, but the file of its label has {found} lines; expected agreement"
     )]
     #[cause(
-        "leave out lines_header, or give the label without rows and images.exposures of the lines"
+        "omit lines_header, or give the label without rows, and images.exposures for the lines"
     )]
     LinesOfFile {
         image: String,
@@ -32,8 +32,8 @@ pub(super) enum ImageError {
         found: u32,
     },
     #[error(
-        "image {image}: line period {stated_ms} ms is stated, but exposure {exposure_ms} ms × summing \
-         {summing} makes {computed_ms} ms; expected them to agree within the rounding of 0.0001 ms"
+        "image {image}: line period {stated_ms} ms is stated, but exposure {exposure_ms} ms × summing {summing} gives \
+         {computed_ms} ms; expected agreement within the rounding of 0.0001 ms"
     )]
     #[cause("give the exposure of one detector line, or the period of summed lines, not a mixture")]
     Period {
@@ -44,7 +44,7 @@ pub(super) enum ImageError {
         computed_ms: f64,
     },
     #[error(
-        "image {image}: {delivered} lines delivered, {header} in the header; expected no more than in the header"
+        "image {image}: {delivered} lines delivered, {header} in the header; expected at most the number in the header"
     )]
     #[cause(
         "lines_header counts the lines that the camera exposed, lines_delivered the lines in the file"

@@ -62,7 +62,7 @@ impl SupportFile {
         support.sees(body, &image.id)?;
         of_one_product(
             image,
-            ("support data are those", support.identifier.as_deref()),
+            ("support data belong to", support.identifier.as_deref()),
         )?;
         let file = Self {
             name: file_name(path),

@@ -13,19 +13,17 @@ pub enum NetError {
     NoMeasurement,
     /// Fewer than two controls that a picture shows.
     #[error("controls measured in a picture: {found}; expected two or more")]
-    #[cause("give at least two controls, named as the points of the measurements")]
+    #[cause("give at least two controls with the names of measured points")]
     TooFewControls {
         /// Number found.
         found: usize,
     },
     /// A picture or brick, with the parts tied to it, can turn, shrink or move.
     #[error(
-        "UnderconnectedPicture: {what} {name} has ties and controls: {ties}; expected two or more at different places, \
-         in a part of the net with two controls"
+        "UnderconnectedPicture: {what} {name} has {ties} ties and controls; expected two or more at different \
+         positions, in a part of the net with two controls"
     )]
-    #[cause(
-        "measure more points that it shares with its neighbours, or leave its measurements out"
-    )]
+    #[cause("measure more points in common with its neighbours, or omit its measurements")]
     Underconnected {
         /// `picture` or `brick`.
         what: &'static str,
@@ -35,9 +33,9 @@ pub enum NetError {
         ties: usize,
     },
     /// Two points of a picture have one place.
-    #[error("points {first} and {second} have the same place in picture {picture}")]
+    #[error("points {first} and {second} have the same position in picture {picture}")]
     #[cause(
-        "points at the same place are one point: give both the same name, or correct one of them"
+        "points at the same position are one point: give both the same name, or correct one of them"
     )]
     EqualPoints {
         /// The picture.
@@ -48,7 +46,7 @@ pub enum NetError {
         second: String,
     },
     /// Two controls have one place.
-    #[error("controls {first} and {second} have the same place on the map")]
+    #[error("controls {first} and {second} have the same position on the map")]
     #[cause(like = EqualPoints)]
     EqualControls {
         /// One point.
@@ -73,9 +71,7 @@ pub enum NetError {
     #[error(
         "WrongUnits: a unit of picture {picture} is {found_m:.4e} m on the ground; expected {expected_m:.4e} m within a factor of 2"
     )]
-    #[cause(
-        "check metres_per_unit of the picture, and the units in which controls and measurements are given"
-    )]
+    #[cause("check metres_per_unit of the picture, and the units of controls and measurements")]
     WrongUnits {
         /// The picture.
         picture: String,
@@ -86,7 +82,7 @@ pub enum NetError {
     },
     /// A control beyond the map.
     #[error(
-        "WrongUnits: control {point} is {x_m:.4e} m east and {y_m:.4e} m north; the map reaches {limit_m:.4e} m"
+        "WrongUnits: control {point} is {x_m:.4e} m east and {y_m:.4e} m north; the map extends to {limit_m:.4e} m"
     )]
     #[cause("check the unit in the column name, x_m or x_km, and the map of the configuration")]
     BeyondTheMap {
@@ -101,7 +97,7 @@ pub enum NetError {
     },
     /// A control outside the area of the projection.
     #[error("control {point} lies outside the area of the projection")]
-    #[cause("choose another projection in the table map")]
+    #[cause("choose another projection in the table [map]")]
     NotOnTheMap {
         /// The point.
         point: String,

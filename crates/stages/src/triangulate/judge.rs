@@ -40,7 +40,7 @@ pub(super) fn judge(of: &Evidence) -> Verdict {
     }
     if totals.removed as f64 > REMOVED_MAX * of.measurements as f64 {
         reasons.push(format!(
-            "{} of {} measurements were left out as blunders; expected at most a tenth",
+            "{} of {} measurements were rejected as blunders; expected at most a tenth",
             totals.removed, of.measurements
         ));
     }
@@ -54,7 +54,7 @@ pub(super) fn judge(of: &Evidence) -> Verdict {
 /// Errors that no datum of the net can show.
 fn untested(of: &Evidence) -> Vec<String> {
     let shared =
-        "an error of place or direction that all controls share (no other control is available)";
+        "an error in position or direction that all controls share (no other control is available)";
     let stretch = of.scales.stretch_max().map(|limit| {
         format!(
             "a stretch of the controls of up to {:.1} % (within their standard deviations)",
@@ -137,7 +137,7 @@ fn remarks(of: &Evidence) -> Vec<String> {
     say(
         totals.removed > 0,
         format!(
-            "measurements left out as blunders: {}, in the bricks: {}",
+            "measurements rejected as blunders: {}, in bricks: {}",
             totals.removed,
             blundered.join(", ")
         ),
@@ -145,7 +145,7 @@ fn remarks(of: &Evidence) -> Vec<String> {
     say(
         totals.flagged as f64 > FLAGGED_MAX * of.measurements as f64,
         format!(
-            "{} measurements in use are beyond 3.5 robust standard deviations",
+            "{} measurements in use deviate by more than 3.5 robust standard deviations",
             totals.flagged
         ),
     );
@@ -157,7 +157,7 @@ fn remarks(of: &Evidence) -> Vec<String> {
         .collect();
     say(
         !rejected.is_empty(),
-        format!("controls left out by SCALE: {}", rejected.join(", ")),
+        format!("controls rejected by SCALE: {}", rejected.join(", ")),
     );
     let kept = of.controls.len() - rejected.len();
     say(
@@ -166,11 +166,11 @@ fn remarks(of: &Evidence) -> Vec<String> {
     );
     say(
         kept == 2 && of.controls.iter().all(|control| control.sigma_m.is_none()),
-        "two controls without standard deviations: standard deviations of points are relative to them".to_owned(),
+        "two controls without standard deviations: standard deviations of points are relative to these controls".to_owned(),
     );
     say(
         of.complaints > 0,
-        format!("rows of tables left out: {}", of.complaints),
+        format!("rows of tables skipped: {}", of.complaints),
     );
     if let (Some(seams), Some(sigma_m)) = (of.seams, totals.tie_sigma_m) {
         let [x, y] = seams.rms_m;

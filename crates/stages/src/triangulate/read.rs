@@ -162,7 +162,7 @@ fn read_pictures_of(config: &NetConfig, index: &Index, data: &mut NetData) -> Re
     }
     if let Some(first) = unmeasured.first() {
         let text = format!(
-            "{} pictures are never measured, for example {first}",
+            "{} pictures have no measurements, for example {first}",
             unmeasured.len()
         );
         data.remarks.push(text);
@@ -217,7 +217,7 @@ fn read_controls_of(config: &NetConfig, index: &Index, data: &mut NetData) -> Re
     }
     if let Some(first) = unseen.first() {
         let text = format!(
-            "{} controls are in no picture, for example {first}",
+            "{} controls are not measured in any picture, for example {first}",
             unseen.len()
         );
         data.remarks.push(text);

@@ -139,7 +139,7 @@ pub struct BrickResult {
     pub brick: String,
     /// Pictures.
     pub pictures: u32,
-    /// Points on several of them.
+    /// Number of points on several pictures of the brick.
     pub ties: u32,
     /// Equations beyond the unknowns.
     pub redundancy: u32,
@@ -147,9 +147,9 @@ pub struct BrickResult {
     pub largest_m: [f64; 2],
     /// Root mean square of δX and δY, metres.
     pub rms_m: [f64; 2],
-    /// Standard deviation of a coordinate from their median, metres.
+    /// Robust standard deviation of a coordinate, from the median absolute deviation, metres.
     pub robust_sigma_m: f64,
-    /// Measurements beyond 3.5 of these that are still in use.
+    /// Number of measurements in use with deviations beyond 3.5 robust standard deviations.
     pub flagged: u32,
     /// Measurements that were rejected.
     pub removed: u32,
@@ -161,25 +161,25 @@ pub struct BrickResult {
 /// Shrinkage of the figure between two controls.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ShrinkageResult {
-    /// Their computed distance over their given distance.
+    /// Ratio of the computed to the given distance between the controls.
     pub factor: f64,
-    /// This ratio by the law, 1 / (1 + 2T / (w L²)).
+    /// Ratio according to the law 1 / (1 + 2T / (w L²)).
     pub law: f64,
 }
 
-/// Seams between bricks: the last line of table 1.
+/// Seams between bricks, as in the last row of Table 1 of Arthur & McMacken 1977.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Seams {
     /// Points on several bricks.
     pub points: u32,
-    /// Largest |δX| and |δY| of a brick from the mean over the bricks, metres.
+    /// Largest |δX| and |δY| of a brick relative to the mean over the bricks, metres.
     pub largest_m: [f64; 2],
     /// Root mean square of δX and δY, metres.
     pub rms_m: [f64; 2],
-    /// Root mean square of δX and δY after LOCAL, where it ran.
+    /// Root mean square of δX and δY after LOCAL, metres; absent if LOCAL did not run.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
     pub local_rms_m: Option<[f64; 2]>,
-    /// Shrinkage by the two controls of EXTEND, before it was reversed.
+    /// Shrinkage that the two controls of EXTEND cause, before its reversal.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
     pub shrinkage: Option<ShrinkageResult>,
 }
@@ -187,35 +187,35 @@ pub struct Seams {
 /// Sums of the net.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Totals {
-    /// Equations of ties, two coordinates of `r − 1` images of every point on `r` pictures.
+    /// Number of tie equations: two coordinates of `r − 1` images of every point on `r` pictures.
     pub tie_equations: u64,
-    /// Equations of controls that were kept.
+    /// Number of equations of kept controls.
     pub control_equations: u64,
     /// Unknowns, four a picture.
     pub unknowns: u64,
     /// Equations beyond the unknowns.
     pub redundancy: u64,
-    /// Standard deviation of a coordinate of an image of a tie, as used, metres; absent when it is not determined.
+    /// Standard deviation of a coordinate of the image of a tie, as used, metres; absent if not determined.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
     pub tie_sigma_m: Option<f64>,
-    /// Whether it was given, not estimated.
+    /// Whether `tie_sigma_m` was given, not estimated.
     pub tie_sigma_given: bool,
-    /// Standard deviation of a coordinate of a control by SCALE, metres; absent for two controls.
+    /// Standard deviation of a control coordinate from SCALE, metres; absent for two controls.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
     pub scale_sigma_m: Option<f64>,
-    /// Root mean square of the residuals of kept controls, X and Y, metres.
+    /// Root mean square residuals of kept controls, X and Y, metres.
     pub control_rms_m: [f64; 2],
     /// Root mean square of the deviations in use, X and Y, metres.
     pub deviation_rms_m: [f64; 2],
     /// Measurements that were rejected.
     pub removed: u64,
-    /// Measurements that are flagged and in use.
+    /// Number of flagged measurements in use.
     pub flagged: u64,
     /// Controls that were rejected.
     pub rejected_controls: u64,
-    /// Largest standard deviation of a coordinate of a point, metres; absent when none is known.
+    /// Largest standard deviation of a point coordinate, metres; absent if none is known.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
     pub largest_sigma_m: Option<f64>,
-    /// Largest floor of the projection under the deviations of a picture, metres.
+    /// Largest projection floor of a picture, metres.
     pub projection_floor_m: f64,
 }

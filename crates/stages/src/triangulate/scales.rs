@@ -140,8 +140,9 @@ impl Scales {
             ratios.sort_by(f64::total_cmp);
             let limit = beyond.iter().map(|of| of.limit).fold(0.0, f64::max);
             reasons.push(format!(
-                "the controls contradict metres_per_unit of {} of {} pictures: a unit is {:.4} times as large as stated (median); \
-                 expected 1 within {:.1} %; check the unit of the controls (kilometres, miles), the table map and metres_per_unit",
+                "the controls contradict metres_per_unit of {} of {} pictures: a unit is {:.4} times as large as \
+                 stated (median); expected 1 within {:.1} %; check the unit of the controls (kilometres, miles), the \
+                 table [map] and metres_per_unit",
                 beyond.len(),
                 self.pictures.len(),
                 ratios[ratios.len() / 2],
@@ -160,7 +161,7 @@ impl Scales {
             if beyond.len() > NAMED_MAX {
                 let more = beyond.len() - NAMED_MAX;
                 reasons.push(format!(
-                    "{more} more pictures differ from their metres_per_unit"
+                    "{more} other pictures also contradict their metres_per_unit"
                 ));
             }
         }
@@ -179,8 +180,9 @@ impl Scales {
         // Written so that NaN counts.
         (!(of.ratio <= limit)).then(|| {
             format!(
-                "the controls are stretched by {:.1} % against the pictures, most at {:.0}° from east; expected at most {:.1} %; check \
-                 that both coordinates of the controls have one unit and belong to the map of the table map",
+                "the controls are stretched by {:.1} % relative to the pictures, most at {:.0}° from east; expected at \
+                 most {:.1} %; check that both coordinates of the controls have the same unit and refer to the map in \
+                 the table [map]",
                 100.0 * of.ratio,
                 of.direction_rad.to_degrees(),
                 100.0 * limit
@@ -204,7 +206,7 @@ impl Scales {
         }
         if self.stretch.is_none() {
             remarks.push(
-                "too few controls, or controls nearly on a line: their stretch is not tested"
+                "too few controls, or controls nearly on a line: the stretch of the controls is not tested"
                     .to_owned(),
             );
         }

@@ -32,7 +32,7 @@ enum BookError {
     #[error("these are not outputs of this version of areograph: {0}")]
     #[cause(Input: "run the site again with this version")]
     Unreadable(String),
-    #[error("outputs of an opened file were written again before they were read: {0}")]
+    #[error("outputs of an opened file were rewritten before they were read: {0}")]
     #[cause(Bug: "this is a bug in areograph; please report it with the configuration")]
     Unread(String),
     #[error("{name} cannot be stored: {source}")]
@@ -134,7 +134,7 @@ impl Book {
         let head = head(layout);
         let start = head.len() as u64;
         if bytes_of(&file, 0, start).in_file(path)? != head.as_bytes() {
-            return Err(unreadable(&"its first line is another one")).in_file(path);
+            return Err(unreadable(&"its first line differs from the expected line")).in_file(path);
         }
         let lines = contents(&file, start).in_file(path)?;
         let file = Arc::new((path.to_owned(), file));

@@ -33,7 +33,7 @@ impl Place {
 
 /// A file that would be overwritten.
 #[derive(Debug, thiserror::Error, Cause)]
-#[cause(Configuration: "give the file to write another name or folder")]
+#[cause(Configuration: "give the output file a different name or folder")]
 enum Overwritten {
     #[error("would be written over the input {0}; expected a different file")]
     Input(PathBuf),

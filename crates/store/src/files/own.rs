@@ -52,7 +52,7 @@ pub enum MarkAt {
 /// A file that a command must not replace.
 #[derive(Debug, thiserror::Error, Cause)]
 #[error("is {found}; expected a new path, or {expected}")]
-#[cause(Configuration: "name another file, or remove this one first if you no longer need it")]
+#[cause(Configuration: "name a different file, or remove this file first if you no longer need it")]
 struct Foreign {
     found: String,
     expected: &'static str,

@@ -87,7 +87,7 @@ impl Input for InOrder<'_, HashedFile> {
 
 /// An output whose value was requested before it was made.
 #[derive(Debug, thiserror::Error, Cause)]
-#[error("the output of {0} was used before it was made")]
+#[error("the output of {0} was used before it was computed")]
 #[cause(Bug: "this is a bug in areograph; please report it with the configuration")]
 pub(super) struct Pending(pub(super) String);
 

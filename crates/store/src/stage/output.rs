@@ -52,7 +52,7 @@ struct Stored<T> {
 /// A stored output that was expected to be intact. A run that meets it begins again, and reads all outputs at once.
 #[derive(Debug, thiserror::Error, Cause)]
 #[error("the stored output of {0} is damaged or cannot be read")]
-#[cause(Io: "run with --force, which computes all outputs anew")]
+#[cause(Io: "run with --force, which recomputes all outputs")]
 struct Lost(String);
 
 /// A clone shares the value.

@@ -65,7 +65,7 @@ pub(in crate::cli::image) struct Arguments {
 /// An unknown camera.
 #[derive(Debug, thiserror::Error, Cause)]
 #[error("unknown camera {0:?}; expected {known}", known = known_cameras())]
-#[cause(Configuration: "name one of them with --camera, or leave it out for all")]
+#[cause(Configuration: "name one of these with --camera, or omit --camera for all")]
 struct NoCamera(String);
 
 fn known_cameras() -> String {

@@ -33,7 +33,7 @@ pub(super) fn compare(found: &mut [Found], metakernel: &Path) -> Result<()> {
         distances_m.extend(found.off_kernels_m);
         if let Some(off_m) = found.off_kernels_m.filter(|off_m| !(*off_m <= allowed_m)) {
             tracing::warn!(
-                "{}: its corners are up to {:.1} km from their positions computed from the kernels; the search allows \
+                "{}: the corners are up to {:.1} km from the positions computed from the kernels; the search allows \
                  {:.1} km, so similar images may have been missed",
                 found.image.product_id,
                 kilometres(off_m),
@@ -44,7 +44,7 @@ pub(super) fn compare(found: &mut [Found], metakernel: &Path) -> Result<()> {
     distances_m.sort_by(f64::total_cmp);
     if let Some(largest_m) = distances_m.last() {
         tracing::info!(
-            "corners of {} images against the kernels: median {:.1} km, largest {:.1} km",
+            "distances of the corners of {} images from the kernels: median {:.1} km, largest {:.1} km",
             distances_m.len(),
             kilometres(distances_m[distances_m.len() / 2]),
             kilometres(*largest_m)

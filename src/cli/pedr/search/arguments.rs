@@ -84,10 +84,10 @@ pub(super) enum Usage {
     #[cause("give --format, or name the file with one of these extensions")]
     Ending(String),
     #[error("{out}: the extension does not match --format {format}")]
-    #[cause("leave out --format, or name the file with the extension of this format")]
+    #[cause("omit --format, or name the file with the extension of this format")]
     OtherEnding { out: String, format: String },
     #[error("{0}: --format count only counts shots and writes no file")]
-    #[cause("leave out --out to print counts, or leave out --format to write shots")]
+    #[cause("omit --out to print counts, or omit --format to write shots")]
     Count(String),
     #[error("{0:?} is not a file; expected the values of a filter in one list")]
     #[cause("separate values by commas (--classes 0,1), or repeat the filter for each value")]

@@ -45,7 +45,7 @@ impl BodyFixed {
         let position_m: Vec<Vector3<f64>> = position_m.collect();
         if let Some(row) = position_m.iter().position(|at| !(at.norm() >= radii_m[1])) {
             let expected = format!(
-                "positions at least {} m from the centre of the target; the position of epoch {row} is {:.1} m from it",
+                "positions at least {} m from the centre of the target; at epoch {row} the distance is {:.1} m",
                 radii_m[1],
                 position_m[row].norm()
             );
@@ -228,7 +228,7 @@ fn body_of(document: &Object<'_>, radii_m: [f64; 2]) -> Result<Body, IsdError> {
     bodies.find(has_them).ok_or_else(|| {
         let [mars, moon] = [Body::Mars, Body::Moon].map(Body::model);
         let expected = format!(
-            "with m_minorAxis the radii of Mars, {} and {} m, or of the Moon, {} m, within {RADIUS_TOLERANCE_M} m",
+            "together with m_minorAxis, the radii of Mars ({} and {} m) or of the Moon ({} m), within {RADIUS_TOLERANCE_M} m",
             mars.equatorial_radius_m, mars.polar_radius_m, moon.equatorial_radius_m
         );
         document.refused("m_majorAxis", expected)
@@ -242,7 +242,7 @@ fn rows<const N: usize>(document: &Object<'_>, key: &str) -> Result<Vec<[f64; N]
     if rest.is_empty() {
         return Ok(rows.to_vec());
     }
-    let expected = format!("{N} numbers for each epoch, not {} in all", numbers.len());
+    let expected = format!("{N} numbers per epoch, not {} in total", numbers.len());
     Err(document.refused(key, expected))
 }
 
@@ -258,7 +258,7 @@ fn counted_rows<const N: usize>(
     if usize::try_from(stated) == Ok(numbers) {
         return Ok(rows);
     }
-    let expected = format!("{numbers}, as many numbers as {key} has");
+    let expected = format!("{numbers}, the count of numbers in {key}");
     Err(document.refused(count, expected))
 }
 
@@ -271,6 +271,6 @@ pub(super) fn as_many(
     if found == expected {
         return Ok(());
     }
-    let expected = format!("{expected} entries, one for each of {other}, not {found}");
+    let expected = format!("{expected} entries, one per entry of {other}, not {found}");
     Err(document.refused(key, expected))
 }

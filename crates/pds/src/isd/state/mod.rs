@@ -78,9 +78,9 @@ pub(crate) enum StateError {
     Content(IsdError),
     #[error(
         "the state belongs to the camera model {model}; expected {LINE_SCANNER}: frame, push-frame, radar and projected \
-         models have no line of detector pixels with times of its own"
+         models have no detector line with its own times"
     )]
-    #[cause("configure the image by label and kernels, or leave it out")]
+    #[cause("configure the image by label and kernels, or omit the image")]
     Model { model: String },
 }
 
@@ -243,7 +243,7 @@ fn distortion(document: &Object<'_>, state: &Value) -> std::result::Result<Value
         LROLROCNAC => Ok(json!({ "lrolrocnac": { "coefficients": coefficients } })),
         _ => {
             let expected = format!(
-                "{RADIAL} (radial) or {LROLROCNAC} (lrolrocnac); areograph supports no other distortions"
+                "one of the supported distortions {RADIAL} (radial) and {LROLROCNAC} (lrolrocnac)"
             );
             Err(document.refused(KEY, expected))
         }
@@ -257,7 +257,7 @@ fn whole(value: &Value) -> Value {
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "whole and within the limits of just before"
+        reason = "a whole number within the limits checked above"
     )]
     number.map_or_else(|| value.clone(), |number| json!(number as u64))
 }

@@ -101,7 +101,7 @@ pub(super) fn number(after: Option<i64>) -> Result<Option<i64>, Problem> {
 
 fn not_next(after: impl std::fmt::Display) -> Problem {
     Problem::bad_request(format!(
-        "after is {after}; expected next of the previous piece."
+        "after is {after}; expected the value of next from the previous page."
     ))
 }
 

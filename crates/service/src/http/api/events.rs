@@ -56,7 +56,7 @@ struct EventData {
 /// Events from now on, or after the event `Last-Event-ID`, as server-sent events. A message `lost` means that older
 /// events are no longer kept.
 #[utoipa::path(get, path = "/api/v1/events", tag = "events", params(
-    ("Last-Event-ID" = Option<i64>, Header, description = "Number of the last event that was seen", minimum = 0),
+    ("Last-Event-ID" = Option<i64>, Header, description = "Number of the last event received", minimum = 0),
 ), responses(
     (status = 200, body = EventData, content_type = "text/event-stream"),
     (status = 503, body = ProblemDocument, content_type = "application/problem+json"),
@@ -81,7 +81,7 @@ pub(super) async fn follow(
     };
     let permit = Arc::clone(&app.streams)
         .try_acquire_owned()
-        .map_err(|_| Problem::busy("Too many streams of events are open.", 10))?;
+        .map_err(|_| Problem::busy("Too many event streams are open.", 10))?;
     let (messages, stream) = mpsc::channel(16);
     tokio::spawn(async move {
         let ending = app.shared.ending.clone();
@@ -91,7 +91,7 @@ pub(super) async fn follow(
             () = tokio::time::sleep(LONGEST) => {}
             told = tell(&app, &caller, last, newest, &messages) => {
                 if let Err(problem) = told {
-                    tracing::warn!("a stream of events ended: {:?}", problem.cause);
+                    tracing::warn!("an event stream ended: {:?}", problem.cause);
                 }
             }
         }

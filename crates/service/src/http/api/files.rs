@@ -36,12 +36,12 @@ const SHOWN: [&str; 4] = [
 /// supported. A product whose content does not have the hash of the manifest is withheld (409).
 #[utoipa::path(get, path = "/api/v1/runs/{run}/files/{*path}", tag = "runs", params(
     ("run" = String, Path, description = "Identifier of the run", pattern = "^[A-Za-z0-9_-]{1,64}$"),
-    ("path" = String, Path, description = "Path of a product as in the manifest; may contain /"),
-    ("Range" = Option<String>, Header, description = "One range of bytes, as in bytes=0-1023"),
+    ("path" = String, Path, description = "Path of a product as listed in the manifest; may contain /"),
+    ("Range" = Option<String>, Header, description = "One byte range, such as bytes=0-1023"),
 ), responses(
     (status = 200, content_type = "application/octet-stream", body = Vec<u8>),
     (status = 206, content_type = "application/octet-stream", body = Vec<u8>),
-    (status = 304, description = "The client has this content"),
+    (status = 304, description = "The client already has this content"),
     (status = "4XX", body = ProblemDocument, content_type = "application/problem+json"),
 ))]
 pub(super) async fn of_run(
@@ -85,7 +85,7 @@ async fn give(product: Product, headers: &HeaderMap) -> Result<Response, Problem
     if fits(headers, &header::IF_MATCH, &etag) == Some(false) {
         return Err(Problem::new(
             StatusCode::PRECONDITION_FAILED,
-            "The product has another hash.",
+            "The product has a different hash.",
         ));
     }
     let mut answer = if fits(headers, &header::IF_NONE_MATCH, &etag) == Some(true) {
@@ -102,7 +102,7 @@ async fn give(product: Product, headers: &HeaderMap) -> Result<Response, Problem
             }
             Wanted::Nothing => {
                 let text = format!(
-                    "The product has {} bytes; the range is beyond them.",
+                    "The product has {} bytes; the range is outside the product.",
                     entry.bytes
                 );
                 let mut refused =
@@ -157,7 +157,9 @@ async fn part(
         if is_unwritten(&watched, &before) {
             return chunk;
         }
-        Err(std::io::Error::other("the product was written meanwhile"))
+        Err(std::io::Error::other(
+            "the product was overwritten during the transfer",
+        ))
     });
     let mut answer = Body::from_stream(stream).into_response();
     answer

@@ -116,7 +116,7 @@ pub(super) async fn list(
     let limit = limit(wanted.limit)?;
     let before = number(wanted.after)?;
     if let Some(site) = &wanted.site {
-        name(site).map_err(|_| Problem::bad_request("site is not the name of a site."))?;
+        name(site).map_err(|_| Problem::bad_request("site is not a valid site name."))?;
     }
     let found = app
         .read(move |connection| {

@@ -150,7 +150,7 @@ pub(super) async fn metrics(_: Reader, State(app): State<Arc<App>>) -> Result<Re
         ),
         plain(
             "roots_unavailable",
-            "Folders of inputs that are not available",
+            "Input folders that are not available",
             unavailable as f64,
         ),
         plain(
@@ -196,7 +196,7 @@ fn of_products(data: &DataStatus) -> Vec<Gauge> {
         ),
         plain(
             "runs_scrub_due",
-            "Runs whose products were not read for longer than changes.scrub_days",
+            "Runs whose products have not been read for longer than changes.scrub_days",
             products.runs_due as f64,
         ),
     ];
@@ -209,17 +209,17 @@ fn of_products(data: &DataStatus) -> Vec<Gauge> {
             ),
             plain(
                 "last_scrub_runs",
-                "Runs whose products the last check after a night read",
+                "Runs whose products were read in the last check after a night",
                 scrub.runs as f64,
             ),
             plain(
                 "last_scrub_bytes",
-                "Bytes that the last check after a night read",
+                "Bytes read in the last check after a night",
                 scrub.bytes as f64,
             ),
             plain(
                 "last_scrub_damaged_runs",
-                "Runs in which the last check after a night found damaged products",
+                "Runs with damaged products in the last check after a night",
                 scrub.damaged_runs as f64,
             ),
         ]);

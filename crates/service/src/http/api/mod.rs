@@ -34,7 +34,8 @@ use super::{app::App, problem::ProblemDocument};
     info(
         title = "areograph",
         description = "Sites, runs, jobs, kernels and shots of an areograph service. Errors are problem documents \
-                       (RFC 9457). Lists come in pages: `next` of one is `after` of the next one. Instants are RFC 3339 in UTC.",
+                       (RFC 9457). Lists are paged: pass `next` of a page as `after` for the following page. \
+                       Instants are in RFC 3339 format, UTC.",
     ),
     components(schemas(ProblemDocument)),
     modifiers(&Tokens),
@@ -48,7 +49,7 @@ impl Modify for Tokens {
     fn modify(&self, api: &mut Description) {
         let bearer = HttpBuilder::new()
             .scheme(HttpAuthScheme::Bearer)
-            .description(Some("A token as `areograph service token add` gives it."))
+            .description(Some("A token created by `areograph service token add`."))
             .build();
         let components = api.components.get_or_insert_default();
         components.add_security_scheme("token", SecurityScheme::Http(bearer));

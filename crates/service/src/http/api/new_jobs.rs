@@ -35,7 +35,10 @@ const REMEMBERED_MS: i64 = 24 * 3_600_000;
 
 /// Sites of the requested jobs.
 #[derive(Debug, Serialize, Deserialize, ToSchema)]
-#[serde(untagged, expecting = "sites is a list of names, or the word all")]
+#[serde(
+    untagged,
+    expecting = "sites is invalid; expected a list of names, or the word all"
+)]
 pub(super) enum SitesAsked {
     /// These sites.
     Named(SiteNames),
@@ -139,7 +142,7 @@ fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>, Problem> {
         return Ok(Some(key.to_owned()));
     }
     Err(Problem::bad_request(
-        "Idempotency-Key is 1 to 100 letters, digits, _ and -.",
+        "Idempotency-Key is invalid; expected 1 to 100 letters, digits, _ and -.",
     ))
 }
 
@@ -148,13 +151,13 @@ fn check(asked: &JobsAsked) -> Result<(), Problem> {
         && !(1..=SITES).contains(&names.len())
     {
         return Err(Problem::bad_request(format!(
-            "sites names {} sites; expected 1 to {SITES}.",
+            "sites contains {} names; expected 1 to {SITES}.",
             names.len()
         )));
     }
     if asked.reason.chars().count() > REASON || asked.reason.contains(char::is_control) {
         return Err(Problem::bad_request(format!(
-            "reason has at most {REASON} characters, on one line."
+            "reason is invalid; expected at most {REASON} characters on one line."
         )));
     }
     Ok(())
@@ -180,7 +183,7 @@ fn make(
         });
         if let Some((earlier, jobs)) = known.optional()? {
             if earlier != request {
-                let text = "This Idempotency-Key was used for another request.";
+                let text = "This Idempotency-Key was used for a different request.";
                 return Ok(Err(Problem::conflict(text)));
             }
             let mut jobs: Vec<JobAsked> = serde_json::from_str(&jobs).unwrap_or_default();

@@ -110,8 +110,8 @@ pub(super) async fn in_polygon(
 fn corners_of_box(text: &str) -> Result<Vec<[f64; 2]>, Problem> {
     let wrong = || {
         Problem::bad_request(
-            "bbox is west,south,east,north in degrees: west and east from -180 to 360 with west before east, by at most 360; \
-             south before north, from -90 to 90.",
+            "bbox is invalid; expected west,south,east,north in degrees: west and east from -180 to 360 with west before east \
+             by at most 360; south before north, from -90 to 90.",
         )
     };
     let numbers: Option<Vec<f64>> = text
@@ -149,7 +149,7 @@ fn corners_of_polygon(polygon: Polygon) -> Result<Vec<[f64; 2]>, Problem> {
         return wrong("type is Polygon.".to_owned());
     }
     let Ok([mut ring]) = <[_; 1]>::try_from(polygon.coordinates) else {
-        return wrong("coordinates hold one ring; holes are not supported.".to_owned());
+        return wrong("expected coordinates with one ring; holes are not supported.".to_owned());
     };
     // GeoJSON repeats the first corner at the end.
     if ring.len() > 1 && ring.first() == ring.last() {

@@ -54,9 +54,9 @@ pub(super) async fn one(
 /// A product of the current run: redirects to that of the run.
 #[utoipa::path(get, path = "/api/v1/sites/{site}/current/{*path}", tag = "sites", params(
     ("site" = String, Path, description = "Name of the site", pattern = "^[A-Za-z0-9_-]{1,64}$"),
-    ("path" = String, Path, description = "Path of a product as in the manifest; may contain /"),
+    ("path" = String, Path, description = "Path of a product as listed in the manifest; may contain /"),
 ), responses(
-    (status = 307, description = "The address is in the header Location"),
+    (status = 307, description = "The Location header contains the address"),
     (status = "4XX", body = ProblemDocument, content_type = "application/problem+json"),
 ))]
 pub(super) async fn current(
@@ -73,7 +73,7 @@ pub(super) async fn current(
         .all(|byte| byte.is_ascii_graphic() && !b"%?#\\".contains(&byte))
         || path.contains("..")
     {
-        return Err(Problem::not_found("No manifest lists such a product."));
+        return Err(Problem::not_found("No manifest lists this product."));
     }
     Ok(Redirect::temporary(&format!("/api/v1/runs/{run}/files/{path}")).into_response())
 }

@@ -21,7 +21,7 @@ pub(super) fn attention(data: &DataStatus, recovering: bool) -> Markup {
                     @if place > 0 { ", " }
                     a href={ "/runs/" (run.run) } { (run.site) " " (run.run) }
                 }
-                ". The service makes a current run again. Restore other runs from a copy."
+                ". The service regenerates current runs. Restore other runs from a copy."
             }
         }
     }

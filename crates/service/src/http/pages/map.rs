@@ -55,7 +55,7 @@ pub(super) fn map(sites: &[Site]) -> Markup {
             }
             figcaption {
                 (counted(placed.len(), "site")) " with windows; east longitude and areocentric latitude. The colour shows the verdict."
-                @if sites.len() > placed.len() { " The windows of the others are not known yet." }
+                @if sites.len() > placed.len() { " The windows of the other sites are not known yet." }
             }
         }
     }

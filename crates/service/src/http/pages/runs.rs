@@ -129,7 +129,7 @@ fn moved(run: &Run) -> Markup {
         .unwrap_or_default();
     html! {
         @if run.moved.is_null() {
-            @if run.predecessor.is_none() { p { "This is the first run." } } @else { p { "Not compared with its predecessor." } }
+            @if run.predecessor.is_none() { p { "This is the first run." } } @else { p { "No comparison with its predecessor." } }
         } @else {
             p { strong { (headline(run)) } }
             @if run.moved.get("beyond_limit").and_then(Value::as_bool) == Some(true) { p class="word invalid" { "Beyond a limit." } }
@@ -147,7 +147,7 @@ fn figure_table(run: &Run, before: Option<&Run>) -> Markup {
     let names: BTreeSet<&String> = now.keys().chain(then.keys()).collect();
     html! {
         @if names.is_empty() { p { "None." } } @else {
-            (table("Figures of this run and the previous one", &["Figure", "This run", "Before", "Difference"], &html! {
+            (table("Figures of this run and the previous run", &["Figure", "This run", "Before", "Difference"], &html! {
                 @for name in names {
                     @let (new, old) = (now.get(name), then.get(name));
                     tr {

@@ -164,7 +164,7 @@ fn standing(sites: &[Site], roots: &[RootFolder], faults: &Faults<'_>, times: &T
         "valid"
     };
     let headline = match (sites.len(), stale) {
-        (0, _) => "No site yet: put site files into the folder of sites".to_owned(),
+        (0, _) => "No sites yet: put site files into the site folder".to_owned(),
         (all, 0) => format!("{}, none of them stale", counted(all, "site")),
         (all, stale) => format!("{}, {stale} of them stale", counted(all, "site")),
     };
@@ -173,8 +173,10 @@ fn standing(sites: &[Site], roots: &[RootFolder], faults: &Faults<'_>, times: &T
         &headline,
         &html! {
             ul {
-                @for root in &away { li { "The folder " code { (root.path) } " is not available since " (times.at(root.since_utc)) ": " (root.detail) ". Its sites are held; nothing is lost." } }
-                @if let Some(problem) = problem { li { "The changed configuration was rejected; the old one remains in force: " (problem) } }
+                @for root in &away { li { "The folder " code { (root.path) } " has been unavailable since "
+                    (times.at(root.since_utc)) ": " (root.detail) ". Its sites are suspended; nothing is lost." } }
+                @if let Some(problem) = problem { li { "The changed configuration was rejected; the former \
+                    configuration remains in force: " (problem) } }
                 (attention(faults.data, faults.recovering))
                 @for site in &wrong { li { a href={ "/sites/" (site.name) } { (site.name) } ": " (site.problem.as_deref().unwrap_or_default()) } }
                 @if refused > 0 { li { "The newest run of " (counted(refused, "site")) " is not valid; earlier products stay current." } }

@@ -103,7 +103,7 @@ pub(super) fn trends(runs: &[Run], times: &Times) -> Markup {
                 }
             }
         }
-        (table("Steps of the kernels and of the verdict", &["Run", "Published, UTC", "Verdict", "Kernels", "Moved"], &html! {
+        (table("Changes of kernels and verdict", &["Run", "Published, UTC", "Verdict", "Kernels", "Moved"], &html! {
             @for (k, run) in oldest_first.iter().enumerate().rev() {
                 @let other_verdict = k.checked_sub(1).is_some_and(|k| oldest_first[k].verdict != run.verdict);
                 @if k == 0 || other_verdict || steps[k].is_some() {

@@ -22,7 +22,7 @@ impl Field {
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "held within the field just before; numbers keep the digits of the field"
+        reason = "clamped to the field just before; numbers keep the precision of the field"
     )]
     pub(crate) fn between(&self, row: f64, column: f64) -> f32 {
         let split = |at: f64, count: usize| {
@@ -105,7 +105,7 @@ impl Field {
 /// Means along `runs` rows (step 1) or columns (step of a row) of `length` numbers each.
 #[allow(
     clippy::cast_possible_truncation,
-    reason = "the digits of the field are kept"
+    reason = "the precision of the field is kept"
 )]
 fn means_of_runs(values: &[f32], runs: usize, [length, step]: [usize; 2], half: usize) -> Vec<f32> {
     let mut means = vec![0.0; values.len()];

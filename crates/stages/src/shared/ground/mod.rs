@@ -54,7 +54,7 @@ impl Ground {
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "a number of cells, held against a limit by the caller; a cast ends at the bounds"
+        reason = "a number of cells that the caller compares with a limit; a cast saturates"
     )]
     pub(crate) fn over_at(
         [middle_rad, parallel_rad]: [f64; 2],

@@ -216,7 +216,7 @@ fn pixels_of_another_image_are_refused() {
     for file in [png(less), tiff(less), cube(less, "")] {
         let message = folder.refusal(&file, &own);
         assert!(
-            message.contains("144 lines; expected 160 or 176, as there is no label"),
+            message.contains("144 lines; expected 160 or 176, because there is no label"),
             "{message}"
         );
     }
@@ -243,7 +243,7 @@ fn pictures_that_may_be_exchanged_are_not_matched() {
         .to_string();
     assert!(
         message.contains(
-            "images M01-00123 and M01-00124: the pixels of both are 160 lines of 64 samples"
+            "images M01-00123 and M01-00124: both pixel files have 160 lines of 64 samples"
         ),
         "{message}"
     );
@@ -278,7 +278,7 @@ fn lines_beyond_those_delivered_are_refused() {
         let message = folder.refusal(&file, &less);
         assert!(
             message.contains(
-                "160 lines; expected at most 144, the lines received of 176 (lines_delivered)"
+                "160 lines; expected at most 144, the number of lines received of 176 (lines_delivered)"
             ),
             "{message}"
         );

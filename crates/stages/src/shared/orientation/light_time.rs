@@ -143,12 +143,12 @@ fn mars_at(left: Et, exposure: Et) -> Rotation<J2000, BodyFixed> {
 /// Effect of the light-time convention of a run on an image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LightTimeEffect {
-    /// The convention of all positions of the camera.
+    /// Convention of all camera positions.
     pub convention: LightTime,
     /// Light time from the ground along the boresight in the middle of the image, seconds.
     #[schemars(range(min = 0.0))]
     pub light_time_s: f64,
-    /// The other conventions; empty where the boresight misses the ground.
+    /// Effects of the other conventions; empty if the boresight misses the ground.
     pub others: Vec<OtherConvention>,
 }
 
@@ -160,8 +160,8 @@ pub struct OtherConvention {
     /// Shift of the boresight on the ellipsoid, metres.
     #[schemars(range(min = 0.0))]
     pub ground_m: f64,
-    /// Shift of the same ground in lines, positive for later ones.
+    /// Shift of the same ground point in lines, positive towards later lines.
     pub lines: f64,
-    /// Shift of the same ground in samples.
+    /// Shift of the same ground point in samples.
     pub samples: f64,
 }

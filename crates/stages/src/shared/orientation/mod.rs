@@ -74,7 +74,8 @@ impl Orientation {
 pub struct OrientationSample {
     /// Epoch.
     pub et: Et,
-    /// Lines from the middle of the header image, see [`LineTimes::offset`](areograph_base::line_times::LineTimes::offset).
+    /// Line offset from the middle of the header image, lines, see
+    /// [`LineTimes::offset`](areograph_base::line_times::LineTimes::offset).
     pub line_offset: f64,
     /// Perspective centre, where straight rays start: see [`LightTimeEffect`].
     pub position: Position<BodyFixed>,
