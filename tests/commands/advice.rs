@@ -37,7 +37,7 @@ fn kind_and_advice_are_those_of_the_attributes() {
                 second: text("b.toml"),
             }),
             Kind::Configuration,
-            "give each site its own identifier: it is also the folder of its products",
+            "give each site its own identifier, which is also the name of its products folder",
         ),
         (
             Box::new(BudgetError::NoSites),
@@ -70,7 +70,7 @@ fn kind_and_advice_are_those_of_the_attributes() {
                 code: 301,
             }),
             Kind::Input,
-            "leave the image out, or set body to the body of its support data; the configuration expects Mars \
+            "omit the image, or set body to the body of its support data; the configuration expects Mars \
              (body = \"mars\")",
         ),
         (
@@ -90,7 +90,7 @@ fn kind_and_advice_are_those_of_the_attributes() {
                 tolerance_s: 1.0,
             }),
             Kind::Coverage,
-            "add kernels that fill the gap, or leave out the image or profile that needs it",
+            "add kernels that fill the gap, or omit the image or profile concerned",
         ),
         (
             Box::new(of_spice("SPICE(SPKINSUFFDATA)")),

@@ -624,7 +624,7 @@ fn a_contradicting_pck_is_said_on_the_terminal() {
     assert!(found.starts_with("exit 0"), "{found}");
     let warning = found.lines().find(|line| line.contains("WARN")).unwrap();
     assert!(
-        warning.contains("the PCK turns IAU_MARS by 0.2"),
+        warning.contains("the PCK rotates IAU_MARS by 0.2"),
         "{warning}"
     );
 }

@@ -166,7 +166,7 @@ const MISTAKES: &[Mistake] = &[
             label(case, "RATIONALE_DESC", map);
         },
         End::Error(3),
-        "no map projection",
+        "without a map projection",
     ),
     (
         "labels_exchanged",
@@ -176,7 +176,7 @@ const MISTAKES: &[Mistake] = &[
             case.write(LABEL, other);
         },
         End::Error(3),
-        "the label is that of product E02/02016; expected E0201301",
+        "the label belongs to product E02/02016; expected E0201301",
     ),
     (
         "labels_exchanged_under_free_names",
@@ -189,7 +189,7 @@ const MISTAKES: &[Mistake] = &[
             site(case, "id = \"E02-02016\"", "id = \"right\"");
         },
         End::Error(3),
-        "the clock of serial number",
+        "the clock in serial number",
     ),
     (
         "one_label_for_both_images",
@@ -344,7 +344,7 @@ const MISTAKES: &[Mistake] = &[
             case.write(kernel, bytes);
         },
         End::Error(4),
-        "mgs_sc_scene.bc holds attitude without angular rates",
+        "mgs_sc_scene.bc contains attitude without angular rates",
     ),
     (
         "pointing_bias_with_the_wrong_sign",
@@ -362,7 +362,7 @@ const MISTAKES: &[Mistake] = &[
         "clock_bias_with_the_wrong_sign",
         |case| site(case, "sign = \"late\"", "sign = \"early\""),
         End::Invalid,
-        "they agree if time tags are corrected by −0.11",
+        "the positions agree if time tags are corrected by −0.11",
     ),
     (
         "orbit_300_m_ahead",
@@ -374,13 +374,13 @@ const MISTAKES: &[Mistake] = &[
         "orbit_300_m_up",
         |case| move_orbit(case, [0.0, 300.0, 0.0]),
         End::Invalid,
-        "the kernels contain an orbit other than the file's",
+        "the orbit in the kernels differs from the orbit in the file",
     ),
     (
         "orbit_300_m_aside",
         |case| move_orbit(case, [0.0, 0.0, 300.0]),
         End::Invalid,
-        "the kernels contain an orbit other than the file's",
+        "the orbit in the kernels differs from the orbit in the file",
     ),
     (
         "datum_against_the_label",
@@ -406,7 +406,7 @@ const MISTAKES: &[Mistake] = &[
             case.write("pedr/shots.b", bytes);
         },
         End::Invalid,
-        "they agree if its coordinates refer to iau1991 instead of iau1994 (pedr.datum)",
+        "the positions agree if the coordinates of the file refer to iau1991 instead of iau1994 (pedr.datum)",
     ),
 ];
 

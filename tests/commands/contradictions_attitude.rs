@@ -151,13 +151,13 @@ const WITH_TIES: &[Mistake] = &[
         "bus_10_mrad_about_x",
         |case| turn(case, Vector3::x(), 0.010),
         End::Refused,
-        "2 images, on average: the beam of MOLA in the PEDR lies",
+        "2 images, on average: according to",
     ),
     (
         "bus_10_mrad_about_y",
         |case| turn(case, Vector3::y(), 0.010),
         End::Refused,
-        "2 images, on average: the beam of MOLA in the PEDR lies",
+        "2 images, on average: according to",
     ),
     (
         "bus_2_mrad_about_x",
@@ -179,7 +179,7 @@ const WITH_TIES: &[Mistake] = &[
             }
         },
         End::Untested,
-        "an error that the start times of all images, or the lines of all tie points, share",
+        "an error common to the start times of all images or to the lines of all tie points",
     ),
 ];
 
@@ -189,20 +189,20 @@ const WITHOUT_TIES: &[Mistake] = &[
         "bus_28_degrees",
         |case| turn(case, Vector3::new(1.0, 1.0, 0.0).normalize(), 0.489),
         End::Refused,
-        "image E02-02016: the beam of MOLA in the PEDR lies",
+        "image E02-02016: according to",
     ),
     (
         "bus_28_degrees_and_no_footprint_inside",
         |case| turn(case, Vector3::new(1.0, 1.0, 0.0).normalize(), 0.489),
         End::Refused,
-        "simultaneous footprints lie in it according to its orientation",
+        "simultaneous footprints inside, and the mountings",
     ),
     (
         // Beam and camera look along this axis.
         "bus_28_degrees_about_its_view",
         |case| turn(case, Vector3::z(), 0.489),
         End::Untested,
-        "rotation about the line of sight; focal length, distortion and direction of the samples of the camera",
+        "rotation about the line of sight; focal length, distortion and sample direction of the camera",
     ),
     (
         "attitude_conjugated",
@@ -214,7 +214,7 @@ const WITHOUT_TIES: &[Mistake] = &[
         "attitude_of_another_day",
         exchange_days,
         End::Refused,
-        "image E02-02016: the beam of MOLA in the PEDR lies",
+        "image E02-02016: according to",
     ),
     (
         "detector_mirrored",
@@ -253,7 +253,7 @@ const WITHOUT_TIES: &[Mistake] = &[
         "all_times_2_s_late",
         |case| shift_times(case, LABEL, 2),
         End::Untested,
-        "an error that clock and UTC in the label of E02-01301 and E02-02016 share",
+        "an error common to clock and UTC in the label of E02-01301 and E02-02016",
     ),
 ];
 

@@ -178,7 +178,7 @@ fn what_is_wrong_is_told_with_segment_and_number() {
             1e300,
             "segment 1 (SPK of -94, type 13): its number of states is 1e300, of ",
         ),
-        (last, 10.0, "words, of which its counts account for"),
+        (last, 10.0, "words; its counts account for"),
         (last - 1, 1e9, "interpolation of degree 1000000000.0 over"),
         (last - 1, 28.0, "interpolation of degree 28.0 over"),
         (first + 7, f64::INFINITY, "record 2 holds inf"),
@@ -196,7 +196,7 @@ fn what_is_wrong_is_told_with_segment_and_number() {
         (
             epochs + states,
             0.0,
-            "entry 1 of the directory of times is 0.0; the time is",
+            "entry 1 of the time directory is 0.0; expected the time",
         ),
     ] {
         let told = says(&spk, at, value);

@@ -256,7 +256,7 @@ fn a_folder_is_filled_in_one_command_and_stays() {
         assert!(
             archive
                 .fetched(&["--verify"])
-                .starts_with("files as they were fetched: ")
+                .starts_with("files unchanged since they were fetched: ")
         );
     }
 }
@@ -471,7 +471,7 @@ fn lasting_faults_are_named_and_leave_no_file() {
         (
             Fault::Redirect(PEDR_PATH.to_owned()),
             6,
-            "it leads on again and again",
+            "there are too many redirections",
         ),
         // From http to https: followed, and this server does not speak it.
         (Fault::Redirect(own), 6, "attempts: "),
@@ -551,13 +551,13 @@ fn wrong_bytes_are_found_by_their_checksum() {
         archive
             .refused(&kernels)
             .1
-            .contains("a web page came in place of the file")
+            .contains("a web page was received instead of the file")
     );
     // Without a checksum, and with a rounded size, an end that marks nothing proves nothing.
     archive.server.always(PEDR_PATH, Fault::NoLength);
     let told = archive.refused(&ORBIT).1;
     assert!(
-        told.contains("its completeness cannot be verified"),
+        told.contains("the file cannot be verified as complete"),
         "{told}"
     );
 }
@@ -637,7 +637,7 @@ fn files_of_others_are_never_replaced_unasked() {
     write(&path, &archive.original(KERNEL_PATH));
     let told = archive.fetched(&kernels);
     assert!(
-        told.contains("mgs_ext1.bsp: was here, and is the file of the archive"),
+        told.contains("mgs_ext1.bsp: was present, and matches the file of the archive"),
         "{told}"
     );
     assert_eq!(archive.server.sent(KERNEL_PATH), 0);
@@ -659,7 +659,7 @@ fn files_of_others_are_never_replaced_unasked() {
     let (code, told) = archive.refused(&["--verify"]);
     assert_eq!(code, 3);
     assert!(
-        told.contains("1 of 5 recorded files are not as they were fetched"),
+        told.contains("1 of 5 recorded files have changed since they were fetched, or are missing"),
         "{told}"
     );
     archive.fetched(&[&kernels[..], &["--replace"]].concat());
@@ -670,7 +670,7 @@ fn files_of_others_are_never_replaced_unasked() {
         archive
             .refused(&["--verify"])
             .1
-            .contains("is not a state of areograph fetch")
+            .contains("is not a state file of areograph fetch")
     );
 }
 
@@ -956,7 +956,7 @@ fn a_place_becomes_a_site_that_can_be_filled() {
     let output = init(&["--place", "gale"]);
     assert_eq!(output.status.code(), Some(3));
     assert!(
-        texts(&output)[1].contains("no copy of the index of images"),
+        texts(&output)[1].contains("no copy of the image index"),
         "{}",
         texts(&output)[1]
     );

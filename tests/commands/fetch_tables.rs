@@ -363,12 +363,12 @@ fn refusals_quote_the_service() {
         (
             r#"{"GDSResults": {"Status": "ERROR", "Error": "Area too large"}}"#.to_owned(),
             6,
-            "the service made no table: ERROR: Area too large",
+            "the service returned no table: ERROR: Area too large",
         ),
         (
             status(r#""JobId": "55117""#),
             6,
-            "as job 55117; expected the table in its answer",
+            "as job 55117; expected the table in the answer",
         ),
         (
             "Server too busy".to_owned(),
@@ -413,7 +413,7 @@ fn other_tables_are_refused() {
         (
             "cut off",
             good.trim_end_matches("10094\r\n").to_owned(),
-            "its last row is malformed, line 51: ",
+            "the last row is malformed (line 51: ",
         ),
         (
             "another box",
@@ -429,7 +429,7 @@ fn other_tables_are_refused() {
         (
             "page",
             "<!DOCTYPE html><html><title>Expired</title></html>".to_owned(),
-            "a web page came in place of the file: Expired",
+            "a web page was received instead of the file: Expired",
         ),
     ] {
         makes(&table);

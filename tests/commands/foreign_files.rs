@@ -237,7 +237,7 @@ fn a_run_replaces_only_products_and_pages() {
         for arguments in [&[][..], &["--force"]] {
             let refused = run(&case, arguments);
             let expected =
-                format!("exit 2\nerror: case/publish: {path}: is in the place of a product");
+                format!("exit 2\nerror: case/publish: {path}: occupies the path of a product");
             assert!(refused.starts_with(&expected), "{refused}");
             assert_eq!(case.read(&path), b"{\"name\": \"mine\"}");
             assert!(!case.path("out/case/ranges.json").exists());

@@ -28,7 +28,7 @@ fn inputs_and_outputs_in_one_folder_are_refused() {
         for command in ["run", "plan", "check"] {
             let outcome = run(&case, &[command, "site.toml", "--out", out]);
             let message = format!(
-                "the output folder {products} overlaps the input folder {input}; expected folders apart from each other"
+                "the output folder {products} overlaps the input folder {input}; expected separate folders"
             );
             assert!(outcome.starts_with("exit 2\n"), "{command}: {outcome}");
             assert!(outcome.contains(&message), "{command}: {outcome}");
@@ -182,7 +182,7 @@ fn a_damaged_line_of_a_label_is_reported() {
     let cases = [
         (
             no_assignment,
-            format!("line {line} of the label is not KEY = value: \"{key}"),
+            format!("line {line} of the label does not have the form KEY = value: \"{key}"),
         ),
         (
             label.replace(key, "SPACECRAFT_CLOCJ_START_COUNT"),
@@ -200,7 +200,7 @@ fn a_damaged_line_of_a_label_is_reported() {
     }
     case.write("image.lbl", label);
     let outcome = run(&case, &RUN);
-    let has_remark = outcome.contains("of the label is not") || outcome.contains(&lost);
+    let has_remark = outcome.contains("of the label does not have the form") || outcome.contains(&lost);
     assert!(!has_remark, "{outcome}");
 }
 

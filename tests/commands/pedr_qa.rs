@@ -480,7 +480,7 @@ fn what_kernels_do_not_cover_is_told() {
     let first = folder.path().join("first");
     write_archive(&first, &ArchiveOptions { seed: 1, days: 1 }).unwrap();
     let out = folder.path().join("out");
-    let told = "23 of 36 profiles could not be checked, 1 only in part";
+    let told = "23 of 36 profiles could not be checked, and 1 only in part";
     let mut command = qa(&pedr(), &first.join("kernels/archive.tm"), &out);
     let (code, answer, _) = ended(&mut command);
     assert_eq!(code, 5);

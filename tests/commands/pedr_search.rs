@@ -396,7 +396,7 @@ fn filters_that_keep_nothing_and_formats_at_odds_are_refused() {
         "{said}"
     );
     let said = refused(&archive, &["--format", "count", "--out", text(&out)]);
-    assert!(said.contains("leave out --out"), "{said}");
+    assert!(said.contains("omit --out"), "{said}");
     assert!(!out.exists());
 }
 

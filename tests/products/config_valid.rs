@@ -233,7 +233,7 @@ fn entries_that_are_never_used_are_told() {
         warnings,
         "site.toml:2:58: kernels.pinned is never used: it belongs to kernels.root\n\
          site.toml:3:46: altimeter_clock.bias_s is never used: altimeter_clock.scope is \"none\"\n\
-         site.toml:4:11: windows are never used: there is no table [pedr]\n\
+         site.toml:4:11: windows are never used without a table [pedr] or tables [[shots]]\n\
          site.toml:5:10: images without a table [pedr]: orientation only, no footprints and no range check\n\
          site.toml:5:89: images.utc_start is never used: sclk_start comes first"
     );
@@ -251,7 +251,7 @@ fn a_window_that_goes_more_than_half_round_mars_is_named() {
         );
         parse_in(&folder, &text).warnings.join("\n")
     };
-    let said = "site.toml:3:40: longitude_deg goes 359° eastward, from 176.5° to 175.5°; if it should be the other 1°, \
+    let said = "site.toml:3:40: longitude_deg spans 359° eastward, from 176.5° to 175.5°; for the other 1°, \
                 write [175.5, 176.5]";
     let swapped = warned("[176.5, 175.5]");
     assert!(swapped.contains(said), "{swapped}");

@@ -331,7 +331,7 @@ fn a_manifest_keeps_its_schema() {
     let hash = "0f".repeat(32);
     let mut document = serde_json::json!({
         "tool": "areograph", "version": "0.1.0", "site": "small",
-        "verdict": { "valid": false, "reasons": ["profile a/1: 3 shots; limit at least 20"], "remarks": ["b"] },
+        "verdict": { "valid": false, "reasons": ["profile a/1: 3 shots; expected at least 20"], "remarks": ["b"] },
         "configuration": { "file_name": "small.toml", "blake3": hash, "keys": { "site": "small" } },
         "biases": [{ "name": "ck_bias", "correction_s": -1.15, "scope": "attitude", "source": "mocAddendum004.ti" }],
         "kernels": [{

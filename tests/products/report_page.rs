@@ -105,7 +105,7 @@ fn errors_that_nothing_shows_are_listed_by_their_reason() {
         .map(|phrase| phrase.rsplit_once(" (").unwrap().1)
         .collect();
     assert_eq!(reasons.len(), untested.len(), "{untested:?}");
-    let camera = "rotation about the line of sight; focal length, distortion and direction of the samples of the camera; first \
+    let camera = "rotation about the line of sight; focal length, distortion and sample direction of the camera; first \
                   sample and summing of the labels (no tie points were adjusted)";
     assert!(
         untested.iter().any(|phrase| phrase == camera),
@@ -219,7 +219,7 @@ fn many_profiles_share_plots_and_the_page_stays_small() {
     assert_eq!(page.matches("<svg").count(), 1 + 6 + 6 + 1 + 1);
     // The verdict stays on one screen, however many profiles break their limit.
     assert!(page.contains("Invalid, for 300 reasons:"));
-    assert!(page.contains("And 296 more, all of them in ../manifest.json."));
+    assert!(page.contains("And 296 more; ../manifest.json lists all of them."));
     assert!(page.len() < 2_000_000, "{} bytes", page.len());
 }
 

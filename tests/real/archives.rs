@@ -215,5 +215,5 @@ fn a_site_is_filled_from_an_archive_in_one_command_and_runs() {
     let manifest = json(&case.path("out/m04/manifest.json"));
     assert_eq!(manifest["counts"]["images"], 1);
     assert!(fetch(&["--plan"]).ends_with("not present: 0\n"));
-    assert!(fetch(&["--verify"]).starts_with("files as they were fetched: 8"));
+    assert!(fetch(&["--verify"]).starts_with("files unchanged since they were fetched: 8"));
 }

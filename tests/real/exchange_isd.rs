@@ -372,7 +372,7 @@ fn tables_that_cannot_keep_the_limit_make_the_image_invalid() {
     let mut site = fixture::Site::small();
     site.orientation.tables.interpolation.error_max_px = 0.25;
     let model = fit_sensor_model(&site.orientation, &site.config.orientation, None).unwrap();
-    let told = "camera tables interpolate with errors up to 0.2500 pixels even with a node per line; \
+    let told = "interpolation errors of camera tables reach 0.2500 pixels even with one node per line; \
                 limit 0.01 pixels";
     assert!(
         model.invalid_because.contains(&told.to_owned()),

@@ -178,7 +178,7 @@ fn cropped_files_of_isis_are_refused_as_they_are() {
     for (file, expected) in [
         (
             "default/h0279_0000_re2_cropped.img",
-            "the file has 17616 bytes; expected 31728, as FILE_RECORDS and RECORD_BYTES",
+            "the file has 17616 bytes; expected 31728, according to FILE_RECORDS and RECORD_BYTES",
         ),
         (
             "phobos/h7926_0009_s22_cropped.img",
@@ -190,7 +190,7 @@ fn cropped_files_of_isis_are_refused_as_they_are() {
         ),
         (
             "srcImage/h2862_0006_sr2_cropped.img",
-            "DETECTOR_ID is \"MEX_HRSC_SRC\"; expected one of the nine lines",
+            "DETECTOR_ID is \"MEX_HRSC_SRC\"; expected one of the nine detector lines",
         ),
     ] {
         let Some(path) = real_data(&format!("isis_hrsc/{file}"), "cropped files of HRSC") else {
@@ -340,7 +340,7 @@ fn a_site_of_one_file_runs_and_a_long_image_follows_its_samples() {
         with_model("[registration]\nmodel = 'rotation_vector'"),
     );
     let refused = case.outcome(case.run());
-    let advice = "over 197 s an orbit departs from any polynomial of second order: remove registration.model";
+    let advice = "over 197 s an orbit departs from any second-order polynomial: remove registration.model";
     assert!(
         !refused.starts_with("exit 0") && refused.contains(advice),
         "{refused}"
@@ -525,7 +525,7 @@ fn labels_that_contradict_the_file_are_refused() {
         (
             "LINES              = 400",
             "LINES = 399",
-            "399 rows of 2644 bytes from byte 18508 on end at byte 1073464",
+            "399 rows of 2644 bytes, beginning at byte 18508, end at byte 1073464",
         ),
         (
             "LINE_PREFIX_BYTES  = 68",
@@ -567,7 +567,7 @@ fn keys_that_contradict_the_file_are_refused() {
         (
             "id = 'h5270",
             "id = 'h5271",
-            "expected H5271_0000_IR2, which its identifier names",
+            "expected H5271_0000_IR2, which the image identifier names",
         ),
         (
             "first_detector = 0\n",
@@ -600,7 +600,7 @@ fn damaged_and_exchanged_files_are_told() {
             case.write("h5270_0000_ir2.img", bytes);
         })
     };
-    let size = "as FILE_RECORDS and RECORD_BYTES of its label state";
+    let size = "according to FILE_RECORDS and RECORD_BYTES in its label";
     for (change, expected) in [
         (&|bytes: &mut Vec<u8>| bytes.truncate(row(399)) as _, size),
         (&|bytes: &mut Vec<u8>| bytes.truncate(row(399) + 7), size),
@@ -645,12 +645,12 @@ fn damaged_and_exchanged_files_are_told() {
         (
             "pixels = 'h5270_0000_ir2.img'",
             "pixels = 'alone.lbl'",
-            "the file holds a label only",
+            "the file contains only a label",
         ),
         (
             "label = 'h5270_0000_ir2.img'",
             "label = 'h5271_0000_ir2.img'",
-            "but the name of the file is \"h5271_0000_ir2.img\"",
+            "but the file name is \"h5271_0000_ir2.img\"",
         ),
     ] {
         let told = told_of(&folder, |case| {

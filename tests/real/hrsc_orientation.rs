@@ -630,7 +630,7 @@ fn what_is_wrong_with_camera_and_line_times_is_said() {
         (
             utc,
             "sclk_start = '1/0150552525.072'\n",
-            "the clock in labels of Mars Express differs by seconds from its clock kernels",
+            "clock readings in Mars Express labels differ by seconds from the clock kernels",
         ),
         (
             utc,
@@ -654,7 +654,7 @@ fn what_is_wrong_with_camera_and_line_times_is_said() {
         (
             "samples = 1288",
             "line_period_ms = 13.0\nsamples = 1288",
-            "no such key beside images.exposures",
+            "no such key: images.exposures states this quantity for every piece",
         ),
         (
             "samples = 1288",
@@ -676,7 +676,7 @@ fn what_is_wrong_with_camera_and_line_times_is_said() {
     case.replace("site.toml", "[6665,", "[6655,");
     let told = case.outcome(case.check());
     assert!(
-        told.contains("no line is exposed for 0.1280 s, 10.0 lines, before line 6654"),
+        told.contains("no line is exposed for 0.1280 s (10.0 lines) before line 6654"),
         "{told}"
     );
 }

@@ -262,7 +262,7 @@ fn tables_that_overlap_count_every_shot_once_below_either_heading() {
     assert_eq!(manifest["complaints"]["count"], 0);
     let notes = manifest["notes"].to_string();
     assert!(
-        notes.contains("2500 rows in the windows repeat another one"),
+        notes.contains("2500 rows in the windows duplicate other rows"),
         "{notes}"
     );
     // `pedr search` gives the same shots, in order of time.
@@ -422,7 +422,7 @@ fn another_heading_is_refused_with_its_column() {
     );
     let told = case.outcome(case.run());
     assert!(
-        told.contains("this one holds shots of MOLA at Mars"),
+        told.contains("this layout is for MOLA shots at Mars"),
         "{told}"
     );
 }

@@ -419,7 +419,7 @@ fn a_pair_of_cubes_with_states_is_registered_as_by_its_support_data() {
     info.args(["image", "info", "cubes/E02-01301.cub", "--json"]);
     let stated = case.outcome(info);
     assert!(
-        stated.contains("state of a camera model by csminit: USGS_ASTRO_LINE_SCANNER_SENSOR_MODEL, UsgsAstroPluginCSM"),
+        stated.contains("camera model state from csminit: USGS_ASTRO_LINE_SCANNER_SENSOR_MODEL, UsgsAstroPluginCSM"),
         "{stated}"
     );
 }

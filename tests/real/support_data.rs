@@ -155,7 +155,7 @@ const MISTAKES: [Mistake; 4] = [
             }
         },
         5,
-        "its support data place the spacecraft 17",
+        "the spacecraft position in its support data differs by 17",
     ),
     (
         "another detector",
@@ -164,13 +164,13 @@ const MISTAKES: [Mistake; 4] = [
             *centre = json!(number(centre) + 500.0);
         },
         5,
-        "its camera differs in detector.boresight_px from the built-in file of MOC narrow angle, whose frame it names, 7",
+        "its camera differs in detector.boresight_px from the built-in file of MOC narrow angle, whose frame the camera names, 7",
     ),
     (
         "those of another image",
         |isd| isd["image_identifier"] = json!("E02-02016"),
         3,
-        "the support data are those of product E02-02016; expected E0201301",
+        "the support data belong to product E02-02016; expected E0201301",
     ),
 ];
 
@@ -311,7 +311,7 @@ const DAMAGES: [Damage; 16] = [
             let rows = isd["instrument_pointing"]["quaternions"].as_array_mut();
             rows.unwrap().pop();
         },
-        "rows, one for each of ephemeris_times, not ",
+        "rows, one per entry of ephemeris_times, not ",
     ),
     (
         "a quaternion that is none",

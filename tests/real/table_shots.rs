@@ -295,7 +295,7 @@ const REFUSED: [(&str, &str, &str, &str); 6] = [
         "an image without support data",
         "isd = \"one.json\"",
         "label = \"one.json\"",
-        "images on the Moon need support data",
+        "images of the Moon require support data",
     ),
     (
         "neither layout nor columns",
@@ -352,7 +352,7 @@ fn rows_that_are_no_shots_are_told_and_rows_that_repeat_count_once() {
     assert!(
         manifest["notes"]
             .to_string()
-            .contains("1 rows in the windows repeat")
+            .contains("1 rows in the windows duplicate")
     );
     // A table of another unit is refused as a whole, with its first row.
     case.replace("site.toml", "layout = \"lola_rdr\"", COLUMNS_IN_METRES);
@@ -441,6 +441,6 @@ fn a_table_on_another_sphere_contradicts_the_kernels(case: &Case) {
     let found = case.outcome(command);
     assert!(found.starts_with("exit 5"), "{found}");
     // With the crossover residual of the file, by which its orbit is too high.
-    let expected = "differs by 201 m from the kernels' (+201 m up";
+    let expected = "differs by 201 m from the position in the kernels (+201 m up";
     assert!(found.contains(expected), "{found}");
 }

@@ -349,7 +349,7 @@ fn a_site_may_name_files_below_the_roots_only() {
     assert!(
         refused
             .text
-            .contains("is not read here; expected a path below"),
+            .contains("lies outside the permitted folders; expected a path below"),
         "{}",
         refused.text
     );
@@ -477,7 +477,7 @@ fn kernels_are_opened_and_damaged_ones_are_told() {
         (0, ""),
         (1, "its number of states is 1e300"),
         (2, ""),
-        (3, "bytes long; its file record states"),
+        (3, "bytes; its file record states"),
         (4, ""),
         (5, ""),
         (6, "a web page"),

@@ -386,7 +386,7 @@ fn orientations_that_are_none_and_kernels_that_end_are_refused() {
         light_time: image.light_time,
     };
     let failure = write_adjusted_kernels(&to, &[nothing]).unwrap_err();
-    assert!(failure.to_string().contains("it holds no instants"));
+    assert!(failure.to_string().contains("it contains no instants"));
     let session = Session::open(&image.set).unwrap();
     assert!(
         refused(&image.orientation)

@@ -419,7 +419,7 @@ fn input_that_is_missing_or_of_another_place_is_told() {
             refused("place", &[("pedr/*.b", "elsewhere/pedr/*.b")]),
         ),
         (
-            "its pixels have 8 lines of 640 samples",
+            "its pixel file has 8 lines of 640 samples",
             refused("size", &[("images/nd.tif", "small.png")]),
         ),
         (

@@ -265,7 +265,7 @@ fn damaged_records_are_complained_of_and_the_others_kept() {
     assert_eq!(
         said,
         [
-            "clock frequency is 7 Hz; expected within 1 % of 1e8",
+            "clock frequency is 7 Hz; expected 1e8 Hz within 1 %",
             "time is inf; expected seconds past J2000",
             "time is 10000000 s, out of order with the neighbouring records",
             "radius of shot 5 is 2147483647 cm; expected 330000000 to 345000000 for a return",
@@ -302,7 +302,7 @@ fn a_file_that_lost_more_than_some_records_stops_the_search() {
     let error = search_footprints(&config(vec![path]), &everywhere, 0.0, &RUN_ON).unwrap_err();
     let told = error.to_string();
     assert!(
-        told.contains("AP19019L.B: 50 of 2500 records cannot be used; expected at most 10 and one in a hundred"),
+        told.contains("AP19019L.B: 50 of 2500 records are unusable; expected at most 10 plus 1 % of the records"),
         "{told}"
     );
     assert!(error.cause.advice().contains("fetch it again"));
@@ -374,7 +374,7 @@ fn a_copy_is_read_once_and_a_note_names_both_files() {
     assert_eq!(result.frames_read, expected.frames_read);
     assert_eq!(
         result.notes.last().map(String::as_str),
-        Some("PEDR file 3 (copy.b) holds the same bytes as file 1 (ap19019k.b): read once")
+        Some("PEDR file 3 (copy.b) is identical to file 1 (ap19019k.b): read once")
     );
 }
 

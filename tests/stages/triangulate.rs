@@ -568,7 +568,7 @@ fn rows_that_cannot_be_read_are_told_and_the_others_are_used() {
     assert!(
         net.verdict
             .remarks
-            .contains(&"rows of tables left out: 2".to_owned())
+            .contains(&"rows of tables skipped: 2".to_owned())
     );
     let pictures: BTreeMap<&str, u32> = net
         .pictures

@@ -351,7 +351,7 @@ fn pairs_are_of_different_orbits() {
         .output()
         .unwrap();
     let told = String::from_utf8_lossy(&output.stderr);
-    assert!(told.contains("2 pairs may be of one orbit"), "{told}");
+    assert!(told.contains("2 pairs may be from one orbit"), "{told}");
 }
 
 #[test]
@@ -404,7 +404,7 @@ fn what_the_index_does_not_say_loses_no_image() {
     );
     warning(
         &whole.replace("MOC-NA", "CTX"),
-        "1 images (the first is M01/00001) are of an unknown camera",
+        "1 images (the first is M01/00001) are from an unknown camera",
     );
     let nowhere = whole
         .replace(",49.70,9.50,", ",,,")

@@ -93,7 +93,7 @@ fn corners_of_the_index_are_held_against_kernels_and_a_wrong_one_is_told() {
     let off_km = wrong[0]["properties"]["off_kernels_km"].as_f64().unwrap();
     assert!((off_km - 35.5).abs() < 2.0, "{off_km} km");
     assert!(
-        told.contains("E02/01301: its corners are up to 3")
+        told.contains("E02/01301: the corners are up to 3")
             && told.contains("the search allows 27.3 km"),
         "{told}"
     );

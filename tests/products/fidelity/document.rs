@@ -122,7 +122,7 @@ pub(crate) fn markdown(fidelity: &Fidelity) -> String {
     writeln!(text, "| all | {all} | | | | | |").unwrap();
     for paper in &fidelity.papers {
         writeln!(text, "\n## {}\n\n{}\n", paper.name, paper.citation).unwrap();
-        text += "| row | kind | place | what | printed; ours (tolerance) | not printed: derived, or of another paper; ours | verdict | \
+        text += "| row | kind | place | what | printed; ours (tolerance) | not printed: derived, or from another paper; ours | verdict | \
                  ours from | notes |\n|---|---|---|---|---|---|---|---|---|\n";
         for row in &paper.rows {
             let cells = [

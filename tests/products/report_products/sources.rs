@@ -37,7 +37,7 @@ const DERIVED: [(&str, &str); 14] = [
     ("Correction of least spread", "best − configured"),
     (
         "Correction of least spread",
-        "spread at the nearest scanned, m",
+        "spread at the nearest scanned correction, m",
     ),
     ("Images (Table 2", "duration, s"),
     ("Images (Table 2", "range at the middle, km"),
@@ -282,7 +282,7 @@ const TEXTS: [(&str, &str); 20] = [
         "limits of the beam, in the table of checks",
     ),
     (
-        "an error of the orbit along",
+        "an orbit error along",
         "the configuration; in the table of limits of ranges",
     ),
 ];

@@ -64,8 +64,8 @@ const UNCHANGED: Kind = Kind {
 };
 
 const ATTITUDE: &str = "an attitude error that all images share";
-const LINE_TIMES: &str = "an error that the start times of all images";
-const DISTORTION: &str = "a distortion of the camera across the track";
+const LINE_TIMES: &str = "an error common to the start times of all images";
+const DISTORTION: &str = "a camera distortion across the track";
 const SHOTS: &str = "errors that ranges and radii of the shots share";
 const ACROSS: &str = "errors of single tie points across the track";
 const RADII: &str = r#"["shot_radii", "mid_radius"]"#;
@@ -200,7 +200,7 @@ const KINDS: &[Kind] = &[
     Kind {
         words: "orbit 80 m along",
         files: |case, _| orbit(case, "[80, 0, 0]"),
-        answer: Answer::NotTested("an error of the orbit along or across the track, up to 100 m"),
+        answer: Answer::NotTested("an orbit error along or across the track, up to 100 m"),
         ..UNCHANGED
     },
     Kind {
@@ -218,7 +218,7 @@ const KINDS: &[Kind] = &[
         words: "profiles misplaced by 0.5 to 2 km",
         errors: |of| of.altimeter.misplaced_chance = 0.5,
         of_misplaced: true,
-        answer: Answer::NotTested("the place of a single profile, up to"),
+        answer: Answer::NotTested("an error in the position of a single profile, up to"),
         ..UNCHANGED
     },
     Kind {

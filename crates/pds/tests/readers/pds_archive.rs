@@ -260,7 +260,7 @@ fn a_record_far_from_every_window_is_judged_only_when_all_are() {
     assert_eq!(
         searched(&sources, &nowhere).complaints,
         [
-            "AP19019L.B record 61: ground latitude is 2147483647 microdegrees; expected at most 90 degrees"
+            "AP19019L.B record 61: ground latitude is 2147483647 microdegrees; expected -90 to 90 degrees"
         ]
     );
     let all = Query::new(Vec::new(), &filter, Judged::All);
@@ -362,7 +362,7 @@ fn a_file_that_shrinks_or_vanishes_while_it_is_read_fails_without_a_signal() {
     });
     let failure = shrunk.failures[&0].to_string();
     let expected =
-        "the file ended early while it was read: it had 51223760 bytes when it was opened";
+        "the file was truncated while it was read: it had 51223760 bytes when opened";
     assert!(failure.contains(expected), "{failure}");
     let removed = meanwhile(|path| fs::remove_file(path).unwrap());
     let failure = removed.failures[&0].to_string();

@@ -316,7 +316,7 @@ fn damaged_files_are_complained_of_and_read_as_far_as_they_go() {
     let complaint = truncated.trailing_complaint().expect("a complaint");
     assert_eq!(
         complaint.to_string(),
-        "AP19019L.B record 12: 700 bytes after the last whole record of 776; ignored"
+        "AP19019L.B record 12: 700 bytes after the last whole record of 776 bytes are ignored"
     );
 
     let stub = file(bytes[..1000].to_vec());
@@ -344,7 +344,7 @@ fn damaged_files_are_complained_of_and_read_as_far_as_they_go() {
     let miscounted = file(miscounted);
     assert_eq!(
         miscounted.label_complaints()[0].to_string(),
-        "AP19019L.B: the label states 99 records; the file holds 12"
+        "AP19019L.B: the label states 99 records; the file contains 12"
     );
 }
 

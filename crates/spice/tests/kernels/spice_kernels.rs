@@ -133,7 +133,7 @@ fn faults_of_cspice_carry_both_messages_of_naif() {
     let long = "9".repeat(300);
     assert_eq!(
         session.sclk_to_et(&long).unwrap_err().cause.to_string(),
-        "a clock string cannot be given to CSPICE: 300 bytes long; expected at most 255"
+        "a clock string cannot be passed to CSPICE: 300 bytes; expected at most 255"
     );
     assert!(
         session.state(et(0.0)).is_err() && session.mounting(usual_instrument(), et(0.0)).is_err()
@@ -197,14 +197,14 @@ fn what_is_no_kernel_is_refused_with_its_name() {
         (
             "head.bsp",
             &spk[..900],
-            "record 1 lies beyond the end of its 900 bytes",
+            "record 1 lies beyond the end of the file (900 bytes)",
         ),
         (
             "short.bsp",
             &spk[..spk.len() - 1_024],
             "its file record states",
         ),
-        ("circle.bsp", &circle, "its summary records form a cycle"),
+        ("circle.bsp", &circle, "the summary records form a cycle"),
     ];
     for (name, content, expected) in cases {
         let failure = one(&write(at, name, content));
@@ -217,7 +217,7 @@ fn what_is_no_kernel_is_refused_with_its_name() {
     }
     let transfer = one(&folder.join("m0402852.ale_1.xsp")).to_string();
     assert!(
-        transfer.contains("is a transfer file (make it binary"),
+        transfer.contains("is a transfer file (convert it"),
         "{transfer}"
     );
     assert_eq!(one(&at.join("absent.bsp")).kind(), Kind::Io);
@@ -225,7 +225,7 @@ fn what_is_no_kernel_is_refused_with_its_name() {
     let deep = at.join("d".repeat(200)).join("e".repeat(200));
     let failure = one(&deep.join("naif.tls")).to_string();
     assert!(
-        failure.contains("a path cannot be given to CSPICE"),
+        failure.contains("a path cannot be passed to CSPICE"),
         "{failure}"
     );
 }
@@ -244,7 +244,7 @@ fn a_chain_of_segments_ends_with_zero_only() {
         let failure = one(&write(temporary.path(), "chain.bsp", &bytes));
         let text = failure.to_string();
         assert!(
-            text.contains(&format!("its summary records continue at record {next}")),
+            text.contains(&format!("the summary records continue at record {next}")),
             "{text}"
         );
         assert_eq!(failure.kind(), Kind::Input);
@@ -312,7 +312,7 @@ fn roles_follow_content_and_nothing_is_loaded_twice() {
     );
     assert_eq!(
         set.explanation().last().unwrap(),
-        "one.bsp: not loaded at its earlier place, same content as seven.tls"
+        "one.bsp: not loaded at its earlier position, same content as seven.tls"
     );
     let last = set.kernels().last().unwrap();
     assert_eq!(
@@ -354,7 +354,7 @@ fn metakernels_are_read_and_written() {
     assert_eq!(set.kernels().len(), 2);
     let explanation = set.explanation().join("\n");
     assert!(explanation.contains("mgs_sclkscet_00061.tsc: stands in for a folder"));
-    assert!(explanation.contains("mgs.tm: its variable EXTRA is not loaded"));
+    assert!(explanation.contains("mgs.tm: variable EXTRA is not loaded"));
 
     let out = at.join("out");
     fs::create_dir(&out).unwrap();
@@ -424,5 +424,5 @@ fn a_path_that_is_too_long_for_cspice_is_named() {
     assert_eq!(failure.kind(), Kind::Input);
     assert_eq!(failure.file.as_deref(), Some(&*path));
     let text = failure.to_string();
-    assert!(text.contains("bytes long; expected at most 255"), "{text}");
+    assert!(text.contains("bytes; expected at most 255"), "{text}");
 }

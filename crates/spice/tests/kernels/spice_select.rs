@@ -144,9 +144,9 @@ fn the_latest_texts_and_the_files_of_the_wanted_time_are_chosen() {
         "naif0012.tls: latest of 2 with leap seconds",
         "pck00010.tpc: latest of 1 with the rotation of Mars",
         // It ends before the exposures, and alone holds the Sun when the light left that Mars saw then.
-        "mgs_map2_first.bsp: the Sun when its light left for Mars",
-        "mgs_map2_gsfc_mgm0827.bsp: not used, not of the orbit solution nav",
-        "mgs_sc_map2_first.bc: not used, holds no attitude near the required times",
+        "mgs_map2_first.bsp: position of the Sun when the light that reaches Mars left it",
+        "mgs_map2_gsfc_mgm0827.bsp: not used, not from the orbit solution nav",
+        "mgs_sc_map2_first.bc: not used, contains no attitude near the required times",
         "README: not used, is a text without a \\begindata block",
     ] {
         assert!(explanation.contains(line), "{line} in {explanation}");
@@ -211,7 +211,7 @@ fn what_is_missing_in_a_folder_is_named() {
     selection.spk_family = "ipng".to_owned();
     let failure = text(&selection);
     assert!(
-        failure.contains("holds the orbit of MGS in the solution ipng (found: mgs_map2.bsp"),
+        failure.contains("contains the orbit of MGS in the solution ipng (found: mgs_map2.bsp"),
         "{failure}"
     );
     selection.pinned = vec!["naif0011.tls".to_owned()];

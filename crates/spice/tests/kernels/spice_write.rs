@@ -181,7 +181,7 @@ fn columns_that_do_not_fit_are_refused() {
     };
     assert_eq!(
         text("none.bsp", none),
-        "segment circle: it holds no instants"
+        "segment circle: it contains no instants"
     );
     let even = SpkSegment { degree: 4, ..spk };
     assert!(text("even.bsp", even).starts_with("spkw13_c: SPICE(INVALIDDEGREE)"));
