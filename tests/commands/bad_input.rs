@@ -589,7 +589,7 @@ fn spoiled_records_are_complained_of_and_the_rest_is_kept() {
     let texts = complaints["texts"].to_string();
     assert!(texts.contains("ap19117l.b record 111: "), "{texts}");
     assert!(
-        texts.contains("100 bytes after the last whole record of 776; ignored"),
+        texts.contains("100 bytes after the last whole record of 776 bytes are ignored"),
         "{texts}"
     );
     // The spoiled frame lies far from the window.

@@ -216,13 +216,13 @@ const MISTAKES: &[Mistake] = &[
         "first_pixel_beyond_the_detector",
         |case| label(case, "EDIT_MODE_ID = \"0\"", "EDIT_MODE_ID = \"1024\""),
         End::Error(3),
-        "end at 3072; expected at most 2048",
+        "end at pixel 3072; expected at most 2048",
     ),
     (
         "samples_beyond_the_detector",
         |case| label(case, "LINE_SAMPLES = 1024", "LINE_SAMPLES = 1040"),
         End::Error(3),
-        "end at 2080; expected at most 2048",
+        "end at pixel 2080; expected at most 2048",
     ),
     (
         "summing_beyond_the_camera",
@@ -544,7 +544,7 @@ fn damaged_pixels_are_told_in_verdict_manifest_and_log() {
     let mut remarks = remarks.iter().map(|remark| remark.as_str().unwrap());
     let remark = remarks.find(|remark| remark.starts_with("pixels of E02-02016: "));
     let remark = remark.unwrap();
-    let expected = "32 of 160 lines are missing, 0 may be damaged, 2 complaints, first: byte 1024: the label's CHECKSUM";
+    let expected = "32 of 160 lines are missing and 0 may be damaged; 2 complaints, first: byte 1024: the label's CHECKSUM";
     assert!(remark.contains(expected), "{remark}");
     let warned = log.lines().find(|line| line.contains(expected)).unwrap();
     assert!(warned.contains("WARN"), "{warned}");

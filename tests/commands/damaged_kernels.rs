@@ -176,7 +176,7 @@ fn what_is_wrong_is_told_with_segment_and_number() {
         (
             last,
             1e300,
-            "segment 1 (SPK of -94, type 13): its number of states is 1e300, of ",
+            "segment 1 (SPK of -94, type 13): its number of states is 1e300, in a segment of ",
         ),
         (last, 10.0, "words; its counts account for"),
         (last - 1, 1e9, "interpolation of degree 1000000000.0 over"),

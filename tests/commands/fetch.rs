@@ -267,7 +267,7 @@ fn a_plan_states_files_sizes_and_reasons() {
     let (code, told) = archive.refused(&[&DAYS[..], &["--plan"]].concat());
     assert_eq!(code, 3);
     assert!(
-        told.contains("no copy of kernels.tab is in this folder")
+        told.contains("this folder contains no copy of kernels.tab")
             && told.contains("areograph fetch --index"),
         "{told}"
     );

@@ -368,7 +368,7 @@ fn refusals_quote_the_service() {
         (
             status(r#""JobId": "55117""#),
             6,
-            "as job 55117; expected the table in the answer",
+            "to job 55117; expected the table in the answer",
         ),
         (
             "Server too busy".to_owned(),

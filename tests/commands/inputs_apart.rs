@@ -114,7 +114,7 @@ fn pedr_files_are_those_of_mola() {
     let site = String::from_utf8(case.read("site.toml")).unwrap();
     case.write("site.toml", format!("altimeter = \"lola\"\n{site}"));
     let outcome = run(&case, &RUN);
-    let expected = "exit 2\nerror: site.toml:1:13: altimeter is \"lola\"; expected mola, whose shots PEDR files hold";
+    let expected = "exit 2\nerror: site.toml:1:13: altimeter is \"lola\"; expected mola, because PEDR files contain its shots";
     assert!(outcome.starts_with(expected), "{outcome}");
     // A file that describes MOLA with another number.
     let mola = include_str!("../../config/altimeters/mola.toml");

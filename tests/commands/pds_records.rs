@@ -574,7 +574,7 @@ fn labels_that_are_not_those_of_a_pedr_are_complained_of_and_no_record_is_lost()
         .map(|complaint| complaint.text.as_str())
         .collect();
     assert!(
-        said.contains(&"records begin after 0 label records; expected 10"),
+        said.contains(&"records begin after 0 label records; expected 10 label records"),
         "{said:?}"
     );
 }

@@ -380,7 +380,7 @@ fn the_page_opens_with_the_outcome_and_needs_nothing_from_outside() {
     for row in map.iter().filter(still) {
         assert_eq!(row[row.len() - 2..], ["0", "0"]);
     }
-    assert!(page.contains("camera%20turned,%20arcsec") && !page.contains("camera%20moved"));
+    assert!(page.contains("camera%20rotation,%20arcsec") && !page.contains("camera%20moved"));
     for outside in ["<script", "src=", "@import", "url("] {
         assert!(!page.contains(outside), "{outside}");
     }

@@ -159,8 +159,8 @@ fn products_that_contradict_the_manifest_are_refused() {
         let hash = &product["blake3"].as_str().unwrap()[..12];
         let bytes = &product["bytes"];
         format!(
-            "exit 3\nerror: aside/case/{path}: {found}; expected {bytes} bytes with the BLAKE3 hash {hash} of \
-             manifest.json\n  what to do: run the site again: damaged products are rewritten\n"
+            "exit 3\nerror: aside/case/{path}: {found}; expected {bytes} bytes with the BLAKE3 hash {hash}, \
+             as in manifest.json\n  what to do: run the site again: damaged products are rewritten\n"
         )
     };
     case.write("aside/case/footprints.parquet", "mine");

@@ -241,18 +241,18 @@ mod tests {
         write_scene(&place, "truth");
         // An empty folder, a file among the scene's own, products in a folder.
         fs::create_dir(place.join("kept")).unwrap();
-        assert!(refusal(&place).contains("holds kept, which"));
+        assert!(refusal(&place).contains("contains kept, which"));
         fs::remove_dir(place.join("kept")).unwrap();
         put(&place.join("sites/b.toml"), "site").unwrap();
-        assert!(refusal(&place).contains("holds sites/b.toml, which"));
+        assert!(refusal(&place).contains("contains sites/b.toml, which"));
         fs::remove_file(place.join("sites/b.toml")).unwrap();
         fs::create_dir(place.join("out")).unwrap();
         put(&place.join("out/ranges.json"), "{}").unwrap();
-        assert!(refusal(&place).contains("holds out, which"));
+        assert!(refusal(&place).contains("contains out, which"));
         fs::remove_dir_all(place.join("out")).unwrap();
 
         put(&place.join("sites/a.toml"), "site of mine").unwrap();
-        assert!(refusal(&place).contains("sites/a.toml was changed"));
+        assert!(refusal(&place).contains("sites/a.toml has been changed"));
         put(&place.join("sites/a.toml"), "site").unwrap();
         write_scene(&place, "again");
     }

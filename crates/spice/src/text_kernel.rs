@@ -206,7 +206,7 @@ mod tests {
             ),
             (
                 "\\begindata\n\nA = ( 1",
-                "line 3: list of A is not closed by ')'",
+                "line 3: the list of A is not closed by ')'",
             ),
             ("\\begindata\nA 1", "line 2: no '=' or '+=' after A"),
             ("\\begindata\nA =", "line 2: no value for A"),

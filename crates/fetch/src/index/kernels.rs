@@ -197,7 +197,7 @@ mod tests {
         refused(
             row("\"N/A\"", "\"N/A\"", "data/a.lbl", "SPK", "a.bsp"),
             LABEL,
-            "an index row of type SPK without START_TIME",
+            "the index row of type SPK has no START_TIME",
         );
         refused(
             good()[..150].to_owned(),
@@ -221,7 +221,7 @@ mod tests {
         refused(
             good(),
             &LABEL.replace("PRODUCT_ID", "PRODUCT"),
-            "no column PRODUCT_ID",
+            "does not define the column PRODUCT_ID",
         );
     }
 }

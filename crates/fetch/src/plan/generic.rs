@@ -71,7 +71,7 @@ mod tests {
         let plan = plan_generic(Path::new("k"), &[vec![file("naif.tls")]], &archive);
         assert_eq!(
             plan.lacks,
-            ["generic kernels: the listing of lsk has no naif*.tls"]
+            ["generic kernels: the listing of lsk contains no naif*.tls"]
         );
     }
 }

@@ -128,7 +128,7 @@ mod tests {
         assert!(before.files.is_empty());
         assert_eq!(
             before.lacks,
-            ["pedr: no file of the archive has orbits 1 to 18000"]
+            ["pedr: no file of the archive contains orbits 1 to 18000"]
         );
         // The first simultaneous pass at Gusev, orbit 18940.
         let start = Utc::parse("2001-03-08T12:56:31").unwrap();

@@ -373,7 +373,7 @@ mod tests {
             |kind, tail: &[f64]| layout(KernelRole::Spk, kind, false, 1_000, tail).unwrap_err();
         assert_eq!(
             spk(13, &[7.0, f64::NAN]),
-            "its number of states is NaN, of 1000 words"
+            "its number of states is NaN, in a segment of 1000 words"
         );
         assert_eq!(
             spk(13, &[7.0]),

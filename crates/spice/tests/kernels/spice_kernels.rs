@@ -133,7 +133,7 @@ fn faults_of_cspice_carry_both_messages_of_naif() {
     let long = "9".repeat(300);
     assert_eq!(
         session.sclk_to_et(&long).unwrap_err().cause.to_string(),
-        "a clock string cannot be passed to CSPICE: 300 bytes; expected at most 255"
+        "a clock string cannot be passed to CSPICE: its length is 300 bytes; expected at most 255"
     );
     assert!(
         session.state(et(0.0)).is_err() && session.mounting(usual_instrument(), et(0.0)).is_err()
@@ -192,7 +192,7 @@ fn what_is_no_kernel_is_refused_with_its_name() {
         (
             "broken.ti",
             b"\\begindata\nINS-1 = (3\n",
-            "line 2: list of INS-1 is not closed by ')'",
+            "line 2: the list of INS-1 is not closed by ')'",
         ),
         (
             "head.bsp",
@@ -392,7 +392,7 @@ fn metakernels_are_read_and_written() {
         ),
         (
             "KERNELS_TO_LOAD = (",
-            "line 3: list of KERNELS_TO_LOAD is not closed",
+            "line 3: the list of KERNELS_TO_LOAD is not closed",
         ),
         ("A = 1", "lists no kernels"),
     ] {

@@ -312,7 +312,7 @@ mod tests {
         assert_eq!(
             damage.as_deref(),
             Some(
-                "1536 of 8960 lines are missing, 0 may be damaged, 2 complaints, first: byte 7: one"
+                "1536 of 8960 lines are missing and 0 may be damaged; 2 complaints, first: byte 7: one"
             )
         );
         let damage = shown(3, &[]).damage();

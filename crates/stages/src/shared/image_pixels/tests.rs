@@ -171,7 +171,7 @@ fn pixels_of_another_image_are_refused() {
     for file in &files {
         let message = folder.refusal(file, &times("M01-00124"));
         assert!(
-            message.contains("of product M01/00123; expected M0100124"),
+            message.contains("to product M01/00123; expected M0100124"),
             "{message}"
         );
         let later = ImageTimes {
