@@ -200,7 +200,8 @@ fn a_damaged_line_of_a_label_is_reported() {
     }
     case.write("image.lbl", label);
     let outcome = run(&case, &RUN);
-    let has_remark = outcome.contains("of the label does not have the form") || outcome.contains(&lost);
+    let has_remark =
+        outcome.contains("of the label does not have the form") || outcome.contains(&lost);
     assert!(!has_remark, "{outcome}");
 }
 

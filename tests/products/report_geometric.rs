@@ -379,7 +379,7 @@ fn what_cannot_be_trusted_is_said() {
     let [east_m, north_m, up_m] = site.adjusted.heights.unwrap().mean_sigma_m;
     assert!(words.contains(&format!(
         "Relative registration is corrected; heights follow MOLA to {up_m:.1} m on average; position is known to \
-         {east_m:.0} m east and {north_m:.0} m north, by orbit and attitude."
+         {east_m:.0} m east and {north_m:.0} m north, from orbit and attitude."
     )));
     // The surface controls tie points across the track in part: with its spacing of shots not all of them.
     let shown = table(

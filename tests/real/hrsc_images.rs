@@ -340,7 +340,8 @@ fn a_site_of_one_file_runs_and_a_long_image_follows_its_samples() {
         with_model("[registration]\nmodel = 'rotation_vector'"),
     );
     let refused = case.outcome(case.run());
-    let advice = "over 197 s an orbit departs from any second-order polynomial: remove registration.model";
+    let advice =
+        "over 197 s an orbit departs from any second-order polynomial: remove registration.model";
     assert!(
         !refused.starts_with("exit 0") && refused.contains(advice),
         "{refused}"

@@ -182,7 +182,12 @@ fn a_folder_that_was_never_seen_must_be_there() {
     fs::rename(keeper.file("kernels"), keeper.file("elsewhere")).unwrap();
     let night = keeper.nightly();
     assert_eq!(night.status.code(), Some(2));
-    for part in ["areograph.toml", "inputs.kernels", "never available", "mount"] {
+    for part in [
+        "areograph.toml",
+        "inputs.kernels",
+        "never available",
+        "mount",
+    ] {
         assert!(said(&night).contains(part), "{}", said(&night));
     }
 }

@@ -41,6 +41,7 @@ mod moved;
 mod net;
 mod notes;
 mod numbers;
+mod outcome;
 mod outlines;
 mod overlays;
 mod plots;

@@ -53,7 +53,7 @@ fn table(site: &SiteProducts) -> Markup {
             Column::Number("uncertainty"),
             Column::Number("configured"),
             Column::Number("best − configured"),
-            Column::Number("spread at the nearest scanned, m"),
+            Column::Number("spread at the nearest scanned correction, m"),
         ],
     );
     for (index, ranges) in site.ranges.profiles.iter().enumerate() {

@@ -1,8 +1,8 @@
 //! Declaration of a section of a site's page.
 
 use super::{
-    checks,
     html::{self, Markup},
+    outcome::outcomes,
 };
 use areograph_base::{error::Result, verdict::CheckKind};
 use areograph_products::SiteProducts;
@@ -36,7 +36,7 @@ impl Section {
         let title = terms.fill(self.title);
         let checks = site.verdict.checks.iter();
         let own = checks.filter(|check| self.checks.contains(&check.kind));
-        let (note, all_pass) = checks::outcomes(own);
+        let (note, all_pass) = outcomes(own);
         let section = html::Section::named(self.anchor, title, (self.write)(site)?);
         Ok(Some(section.folded(note, !all_pass)))
     }

@@ -303,6 +303,6 @@ fn first_of(sentences: &[String]) -> Markup {
     let more = sentences.len() - shown.len();
     html! {
         (list(shown))
-        @if more > 0 { p { "And " (more) " more, all of them in ../manifest.json." } }
+        @if more > 0 { p { "And " (more) " more; ../manifest.json lists all." } }
     }
 }

@@ -61,7 +61,7 @@ stage_inputs! {
 
 impl Stage for ConvertDatum<'_> {
     const NAME: &'static str = "convert_datum";
-    const METHOD: u32 = 3;
+    const METHOD: u32 = 4;
     const CHECKED: bool = true;
     type Output = Converted;
     stage_inputs!(fingerprint);

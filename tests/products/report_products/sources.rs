@@ -269,7 +269,7 @@ const TEXTS: [(&str, &str); 20] = [
     ("Light time", "spans over images; tests/light_time"),
     ("Limits for order 2", "the configuration"),
     ("Kept: class", "the configuration"),
-    ("Datum from version", "a constant"),
+    ("Datum from the version", "a constant"),
     ("Tolerance", "the method"),
     ("D = √", "a formula"),
     ("1 PEDR file", "a note of the manifest"),

@@ -361,8 +361,7 @@ fn a_file_that_shrinks_or_vanishes_while_it_is_read_fails_without_a_signal() {
         file.set_len(1_000_000).unwrap();
     });
     let failure = shrunk.failures[&0].to_string();
-    let expected =
-        "the file was truncated while it was read: it had 51223760 bytes when opened";
+    let expected = "the file was truncated while it was read: it had 51223760 bytes when opened";
     assert!(failure.contains(expected), "{failure}");
     let removed = meanwhile(|path| fs::remove_file(path).unwrap());
     let failure = removed.failures[&0].to_string();
