@@ -203,7 +203,7 @@ fn another_rotation_of_the_body_is_told() {
     }
     let found = calibrated(folder.path()).unwrap();
     let remarks = found.verdict.remarks.concat();
-    assert!(remarks.contains("rotate Mars by 592.7 m"), "{remarks}");
+    assert!(remarks.contains("is rotated by 592.7 m"), "{remarks}");
 }
 
 /// What the steps must reach, at withheld control and against the truth.

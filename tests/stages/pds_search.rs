@@ -268,7 +268,7 @@ fn damaged_records_are_complained_of_and_the_others_kept() {
             "clock frequency is 7 Hz; expected 1e8 Hz within 1 %",
             "time is inf; expected seconds past J2000",
             "time is 10000000 s, out of order with the neighbouring records",
-            "radius of shot 5 is 2147483647 cm; expected 330000000 to 345000000 for a return",
+            "radius of shot 5 is 2147483647 cm; expected 330000000 to 345000000 cm for a return",
         ]
     );
     let records: Vec<_> = result.complaints[..4]
@@ -374,7 +374,7 @@ fn a_copy_is_read_once_and_a_note_names_both_files() {
     assert_eq!(result.frames_read, expected.frames_read);
     assert_eq!(
         result.notes.last().map(String::as_str),
-        Some("PEDR file 3 (copy.b) is identical to file 1 (ap19019k.b): read once")
+        Some("PEDR file 3 (copy.b) is identical to file 1 (ap19019k.b) and is read once")
     );
 }
 

@@ -627,7 +627,7 @@ fn products_of_something_else_are_left_alone() {
         refused.contains("the folder contains other products"),
         "{refused}"
     );
-    assert!(refused.contains("made by convert_datum"), "{refused}");
+    assert!(refused.contains("created by convert_datum"), "{refused}");
     assert_eq!(fs::read_to_string(&path).unwrap(), before);
     assert!(outcome.folder.join("report/index.html").is_file());
     // Products of a net remain replaceable when its stages have other names.

@@ -138,7 +138,7 @@ fn control_of_another_sphere_contradicts_another_orbit() {
             let valid = found.verdict.valid;
             println!("seed {seed}, {by_m} m: {offset:?}, valid {valid}");
             let reasons = found.verdict.reasons.concat();
-            let is_named = reasons.contains("orbit i818: control in height");
+            let is_named = reasons.contains("orbit i818: the mean offset of control in height");
             assert_eq!(
                 valid,
                 offset.offset_m <= offset.limit_m,
