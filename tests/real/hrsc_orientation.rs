@@ -659,7 +659,7 @@ fn what_is_wrong_with_camera_and_line_times_is_said() {
         (
             "samples = 1288",
             "samples = 1300",
-            "at most 5184, the pixels of HRSC",
+            "at most 5184, the number of pixels of HRSC",
         ),
     ] {
         let case = case(&folder, &all_names());
@@ -725,17 +725,17 @@ fn a_camera_file_is_of_one_spacecraft() {
         (
             "ck_bias_s = 0.0",
             "ck_bias_s = -1.15",
-            "pointing.ck_bias_s is -1.15 of a camera on Mars Express; expected 0",
+            "pointing.ck_bias_s is -1.15 for a camera on Mars Express; expected 0",
         ),
         (
             "spacecraft = \"mex\"",
             "spacecraft = \"mgs\"",
-            "expected -94000 and MGS_SPACECRAFT, those of Mars Global Surveyor",
+            "expected -94000 and MGS_SPACECRAFT for Mars Global Surveyor",
         ),
         (
             "bus = -41001",
             "bus = -41000",
-            "naif.bus is -41000 and naif.bus_frame MEX_SC_REF; expected -41001",
+            "naif.bus is -41000 and naif.bus_frame is MEX_SC_REF; expected -41001",
         ),
         (
             "spacecraft = \"mex\"",

@@ -131,7 +131,7 @@ fn passes_off_nadir_are_named(name: &str, notes: &str) {
         "weak_negative_2" => &["orbit 19926", "orbit 20240"],
         _ => &[],
     };
-    let (_, passes) = notes.split_once("passes off nadir").unwrap_or_default();
+    let (_, passes) = notes.split_once("off-nadir passes").unwrap_or_default();
     assert_eq!(
         passes.matches("orbit 1").count() + passes.matches("orbit 2").count(),
         expected.len(),
@@ -481,7 +481,7 @@ fn longitude_0_and_the_pole_are_kept_and_a_pulse_has_one_place() {
     assert_eq!(manifest["complaints"]["count"], 1);
     let texts = manifest["complaints"]["texts"].to_string();
     assert!(
-        texts.contains("table.csv line 6: the shot of table.csv line 3 with other values"),
+        texts.contains("table.csv line 6: same shot as in table.csv line 3, but different values"),
         "{texts}"
     );
 }

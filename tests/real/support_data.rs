@@ -336,7 +336,7 @@ const DAMAGES: [Damage; 16] = [
     (
         "a distortion that nobody here knows",
         |isd| isd["optical_distortion"] = json!({"kaguyalism": {"x": [0.0], "y": [0.0]}}),
-        "expected one of the distortions radial, lrolrocnac",
+        "expected one of the supported distortions radial and lrolrocnac",
     ),
     (
         "no lines between pixels",
@@ -349,7 +349,7 @@ const DAMAGES: [Damage; 16] = [
             let start = isd["starting_ephemeris_time"].as_f64().unwrap();
             isd["starting_ephemeris_time"] = json!(start + 1.0);
         },
-        "expected the time of the first line by line_scan_rate",
+        "expected the time of the first line computed from line_scan_rate",
     ),
     (
         "more lines than tables",

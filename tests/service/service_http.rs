@@ -678,7 +678,7 @@ fn a_service_that_cannot_work_says_so() {
     assert_eq!((ready.status, &ready.json()["roots"]), (503, &json!(false)));
     let home = world.get("/").text();
     assert!(
-        home.contains("<code>kernels</code> is not available"),
+        home.contains("<code>kernels</code> has been unavailable since"),
         "{home}"
     );
     world.shared.set_problem(Some("line 3: cron".to_owned()));
