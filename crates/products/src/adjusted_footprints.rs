@@ -80,7 +80,7 @@ fn shot_columns<'a>() -> Vec<Column<Shot<'a>>> {
         columns.push(column(
             sigma,
             Unit::Metre,
-            "standard deviation of the adjusted coordinate, metres, with the shift of its profile",
+            "standard deviation of the adjusted coordinate, including the shift of its profile, metres",
             move |shot: &Shot| sigma_m(shot.0, axis),
         ));
     }
@@ -89,7 +89,7 @@ fn shot_columns<'a>() -> Vec<Column<Shot<'a>>> {
         range(
             "range_m",
             Unit::Metre,
-            "measured range, metres; missing where no image was exposed at the time",
+            "measured range, metres; missing if no image was exposed at the time of the shot",
             |range| Some(range.range_m),
         ),
         range(
@@ -101,13 +101,13 @@ fn shot_columns<'a>() -> Vec<Column<Shot<'a>>> {
         range(
             "range_redundancy",
             Unit::None,
-            "fraction of an error of the range that appears in its residual, 0 to 1",
+            "redundancy number: share of a range error that appears in the residual, 0 to 1",
             |range| Some(range.residual_m.redundancy),
         ),
         range(
             "range_standardised",
             Unit::None,
-            "residual over its own standard deviation; missing where it is uncontrolled",
+            "range residual divided by its standard deviation; missing if the range is uncontrolled",
             |range| range.residual_m.standardised,
         ),
     ]);
@@ -120,7 +120,7 @@ fn local_columns<'a>() -> Vec<Column<Shot<'a>>> {
     let kinds: [([&'static str; 3], &'static str, Sigmas); 3] = [
         (
             ["sigma_east_m", "sigma_north_m", "sigma_up_m"],
-            "standard deviation in east, north or height, metres, with the shift of the profile",
+            "standard deviation in east, north or height, including the shift of the profile, metres",
             |point| Some(point.local_sigmas_m()),
         ),
         (
@@ -129,7 +129,7 @@ fn local_columns<'a>() -> Vec<Column<Shot<'a>>> {
                 "shared_sigma_north_m",
                 "shared_sigma_up_m",
             ],
-            "standard deviation of the shift that all footprints of the profile share, metres; it does not average out",
+            "standard deviation of the shift that all footprints of the profile share, metres; this shift does not average out",
             |point| Some(point.shared?.sigma_m),
         ),
         (
@@ -138,7 +138,7 @@ fn local_columns<'a>() -> Vec<Column<Shot<'a>>> {
                 "relative_sigma_north_m",
                 "relative_sigma_up_m",
             ],
-            "standard deviation without the shift of the profile, metres, for differences of footprints of one profile",
+            "standard deviation without the shift of the profile, metres, for differences between footprints of one profile",
             CorrectedPoint::relative_sigmas_m,
         ),
     ];

@@ -54,7 +54,7 @@ pub struct AdjustedKernels<'a> {
 
 pub(super) static ATTITUDE: Declaration = Declaration {
     path: "adjusted/<image>.bc",
-    what: "adjusted attitude of the bus around the image, J2000 (CK type 3)",
+    what: "adjusted attitude of the bus around the time of the image, J2000 (CK type 3)",
     readers: "SPICE, ISIS, ALE",
     rows: "epochs",
     role: Role::Data,
@@ -68,7 +68,7 @@ pub(super) static ATTITUDE: Declaration = Declaration {
 
 pub(super) static POSITION: Declaration = Declaration {
     path: "adjusted/<image>.bsp",
-    what: "adjusted position of the spacecraft from {body} around the image, geometric, J2000 (SPK type 13)",
+    what: "adjusted geometric position of the spacecraft relative to {body} around the time of the image, J2000 (SPK type 13)",
     readers: "SPICE, ISIS, ALE",
     rows: "epochs",
     role: Role::Data,
@@ -79,7 +79,7 @@ pub(super) static POSITION: Declaration = Declaration {
 
 pub(super) static METAKERNEL: Declaration = Declaration {
     path: "adjusted.tm",
-    what: "the kernels of the site, then the adjusted kernels",
+    what: "metakernel of the site kernels, followed by the adjusted kernels",
     readers: "SPICE",
     rows: "",
     role: Role::Metadata,
@@ -202,7 +202,7 @@ fn comment(image: &AdjustedImage, to: &AdjustedKernels) -> String {
         "ISIS and ALE apply this offset: load the file as it is.".to_owned()
     } else {
         format!(
-            "ISIS and ALE always read attitude {usual_s:.3} s from the exposure: do not use this\n\
+            "ISIS and ALE always read the attitude {usual_s:.3} s from the exposure: do not use this\n\
              file with them."
         )
     };
@@ -211,14 +211,14 @@ fn comment(image: &AdjustedImage, to: &AdjustedKernels) -> String {
          Load it after the kernels of the mission. It is valid only for this image, which was exposed over\n\
          {exposed}\n\
          (UTC of the first line {utc}). Where the adjustment found that lines were exposed later or earlier\n\
-         than their tags, the orientation of a line is stored at its tag: do not place anything else\n\
-         observed at the time, such as a laser shot, with this file.\n\
+         than their tags, the orientation of a line is stored at its tag: do not use\n\
+         this file to locate other observations of the same time, such as laser shots.\n\
          \n\
-         Positions: {spacecraft} relative to the centre of Mars, geometric, J2000, with the rotation of Mars of the\n\
+         Positions: {spacecraft} relative to the centre of Mars, geometric, J2000, with the Mars rotation of the\n\
          IAU 2000 report (pck00008 to pck00010). {positions}\n\
-         Use positions and attitudes together: along the track the adjustment separates neither from line times, so that the\n\
-         camera may have been farther along its orbit when a line was exposed, and the attitude makes up for it on the\n\
-         ground (adjustment.json, line_time_sigma_s).\n\
+         Use positions and attitudes together: the adjustment does not separate them from line times along the track.\n\
+         The camera may have been farther along its orbit when a line was exposed; the attitude compensates for this\n\
+         on the ground (adjustment.json, line_time_sigma_s).\n\
          \n\
          Attitudes: J2000 to {bus_frame}. The attitude of an exposure at t is stored at t {sign} {size:.3} s,\n\
          as in the kernels that this file replaces. {others}\n",
@@ -239,18 +239,19 @@ const fn positions(light_time: LightTime) -> &'static str {
     match light_time {
         LightTime::Surface => {
             "They were adjusted with light time to the\n\
-             surface and aberration: the position of an exposure is that of the instant at which the light left\n\
-             the ground. Programs that see the spacecraft from the centre of Mars (LT+S: ISIS, ALE) place it\n\
-             elsewhere."
+             surface and aberration: an exposure has the position of the instant at which the light left the\n\
+             ground. Programs that compute the spacecraft position from the centre of Mars (LT+S: ISIS, ALE) obtain\n\
+             a different position."
         }
         LightTime::None | LightTime::Support => {
             "They were adjusted without light time:\n\
-             the position of an exposure is that of its instant. Programs that see the spacecraft from the centre\n\
-             of Mars (LT+S: ISIS, ALE) place it elsewhere."
+             an exposure has the position of its own instant. Programs that compute the spacecraft position from\n\
+             the centre of Mars (LT+S: ISIS, ALE) obtain a different position."
         }
         LightTime::Centre => {
             "They were adjusted as seen from the centre\n\
-             of Mars with light time and aberration: programs that do so (LT+S: ISIS, ALE) find them adjusted."
+             of Mars with light time and aberration: programs that apply both (LT+S: ISIS, ALE)\n\
+             obtain the adjusted positions."
         }
     }
 }
@@ -285,9 +286,9 @@ fn metakernel(to: &AdjustedKernels, images: &[AdjustedImage]) -> Result<String> 
     Ok(text.replacen(
         "\n\n",
         &format!(
-            "\n\nThe last kernels are adjusted: each pair is valid only for its image, not for laser shots or other \
-             images, with\n\
-             the pointing bias of {}.\n\n",
+            "\n\nThe last kernels are adjusted: each pair is valid only for its image with the \
+             pointing\n\
+             bias of {}, not for laser shots or other images.\n\n",
             biases.join(", ")
         ),
         1,

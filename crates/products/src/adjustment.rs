@@ -38,7 +38,9 @@ use readings::OtherReadingDocument;
 #[derive(Serialize, JsonSchema)]
 #[schemars(
     title = "Adjustment of a site",
-    description = "adjustment.json of areograph: tie points intersected with the orientation from the kernels and with the adjusted one, every pair of images compared, and the combined adjustment. Metres, radians, seconds, pixels of the image; unknown values are omitted."
+    description = "adjustment.json of areograph: tie points intersected with the orientation from the \
+                   kernels and with the adjusted orientation, comparisons of every pair of images, and the combined \
+                   adjustment. Units: metres, radians, seconds, image pixels; unknown values are omitted."
 )]
 struct Document<'a> {
     #[schemars(extend("const" = "areograph adjustment 1"))]
@@ -61,7 +63,7 @@ struct Definition {
 
 #[derive(Serialize, JsonSchema)]
 struct Configured<'a> {
-    /// The form of orientation that the configuration requires; otherwise `registration.json` states the form of each
+    /// Form of orientation, if the configuration requires one; otherwise `registration.json` states the form of each
     /// image.
     #[serde(skip_serializing_if = "Option::is_none")]
     model: Option<CameraModel>,
@@ -188,7 +190,7 @@ struct AdjustmentDocument<'a> {
     heights: Option<&'a HeightSummary>,
     #[serde(skip_serializing_if = "Option::is_none")]
     relief: Option<&'a ReliefSummary>,
-    /// Pointing of the laser in simultaneous images.
+    /// Boresight of the laser from simultaneous images.
     #[serde(skip_serializing_if = "Option::is_none")]
     boresight: Option<BoresightDocument<'a>>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -216,12 +218,12 @@ struct ImageDocument<'a> {
     #[schemars(extend("exclusiveMinimum" = 0))]
     line_period_s: f64,
     correction: &'a [f64; ORIENTATION_UNKNOWNS],
-    /// Position of the spacecraft in the PEDR file, X, Y and Z, metres, where that was the expected position.
+    /// X, Y and Z of the spacecraft position in the PEDR file, metres, if it was the expected position.
     #[serde(skip_serializing_if = "Option::is_none")]
     pedr_orbit_m: Option<[f64; 3]>,
     #[schemars(transform = none_negative)]
     sigmas: &'a [f64; ORIENTATION_UNKNOWNS],
-    /// Standard deviation of a delay of all lines that `sigmas` contain; 0 where they contain none.
+    /// Standard deviation of the delay of all lines, as contained in `sigmas`; 0 if `sigmas` contain no delay.
     #[schemars(range(min = 0.0))]
     line_time_sigma_s: f64,
     /// With its standard deviation.
@@ -235,7 +237,7 @@ pub const ADJUSTMENT: &str = "adjustment.json";
 
 pub(super) static DOCUMENT: Declaration = Declaration {
     path: ADJUSTMENT,
-    what: "tie points intersected before and after the adjustment, every pair of images compared, the adjustment itself",
+    what: "tie points intersected before and after the adjustment, comparisons of image pairs, the adjustment itself",
     readers: "scripts",
     rows: "adjusted points",
     role: Role::Data,

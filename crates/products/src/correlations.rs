@@ -10,7 +10,7 @@ use areograph_stages::adjust::CorrectedImage;
 
 pub(super) static TABLE: Declaration = Declaration {
     path: "correlations.parquet",
-    what: "correlations between the orientation coefficients of each image, with the line times that their covariance contains",
+    what: "correlations between the orientation coefficients of each image, from covariances that contain line times",
     readers: "scripts",
     rows: "pairs of unknowns",
     role: Role::Data,
@@ -81,7 +81,7 @@ fn columns<'a>() -> Vec<Column<Pair<'a>>> {
         column(
             "correlation",
             Unit::None,
-            "their correlation, -1 to 1; beyond 0.95 do not interpret single values",
+            "correlation of the two unknowns, -1 to 1; beyond ±0.95, do not interpret single values",
             |row: &Pair| row.correlation,
         ),
     ]

@@ -108,7 +108,7 @@ struct LinePieceDocument {
 struct Euler<'a> {
     #[schemars(range(min = 0.0))]
     position_rmse_m: f64,
-    /// Root mean square effect of the angles' residuals on the ellipsoid.
+    /// Root mean square effect of the angle residuals on the ellipsoid.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0))]
     pointing_ground_rmse_m: Option<f64>,
@@ -269,49 +269,49 @@ fn columns<'a>() -> Vec<Column<Sample<'a>>> {
         column(
             "quaternion_w",
             Unit::None,
-            "camera to {body}, SPICE convention, w",
+            "quaternion from camera to {body}, SPICE convention, w",
             |s: &Sample| s.1[0],
         ),
         column(
             "quaternion_x",
             Unit::None,
-            "camera to {body}, SPICE convention, x",
+            "quaternion from camera to {body}, SPICE convention, x",
             |s: &Sample| s.1[1],
         ),
         column(
             "quaternion_y",
             Unit::None,
-            "camera to {body}, SPICE convention, y",
+            "quaternion from camera to {body}, SPICE convention, y",
             |s: &Sample| s.1[2],
         ),
         column(
             "quaternion_z",
             Unit::None,
-            "camera to {body}, SPICE convention, z",
+            "quaternion from camera to {body}, SPICE convention, z",
             |s: &Sample| s.1[3],
         ),
         boresight(
             "boresight_longitude_deg",
             Unit::Degree,
-            "east longitude where the boresight meets the ellipsoid",
+            "east longitude of the point where the boresight meets the ellipsoid",
             |ground| degrees(ground.longitude_rad),
         ),
         boresight(
             "boresight_latitude_deg",
             Unit::Degree,
-            "{latitude} latitude where the boresight meets the ellipsoid",
+            "{latitude} latitude of the point where the boresight meets the ellipsoid",
             |ground| degrees(ground.latitude_rad),
         ),
         boresight(
             "boresight_range_m",
             Unit::Metre,
-            "distance of this point from the camera, metres",
+            "distance from the camera to this point, metres",
             |ground| ground.range_m,
         ),
         boresight(
             "boresight_emission_deg",
             Unit::Degree,
-            "angle between surface normal and direction to the camera at this point, degrees",
+            "angle between the surface normal and the direction to the camera at this point, degrees",
             |ground| degrees(ground.emission_rad),
         ),
     ]

@@ -36,7 +36,7 @@ const DEFINITIONS: [(&str, &str); 5] = [
     ),
     (
         "differences_m",
-        "height from the first profile minus height from the second, of profiles that are not left out",
+        "height from the first profile minus height from the second, for profiles that are not rejected",
     ),
     (
         "shifts",

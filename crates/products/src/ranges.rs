@@ -61,7 +61,7 @@ const DEFINITIONS: [(&str, &str); 7] = [
     ),
     (
         "summary",
-        "all shots of the site, each counted once, even if it lies in several windows; the standard deviation \
+        "all shots of the site, each counted once, even if the shot lies in several windows; the standard deviation \
          includes differences between profiles, which the standard deviations of single profiles do not",
     ),
 ];
@@ -136,7 +136,7 @@ struct ProfileDocument<'a> {
     orbit: u32,
     et_start_s: f64,
     et_stop_s: f64,
-    /// Areocentric longitude of the Sun at its start, the season of Mars.
+    /// Areocentric longitude of the Sun at the start of the profile: the season of Mars.
     #[serde(skip_serializing_if = "Option::is_none")]
     solar_longitude_deg: Option<f64>,
     simultaneous: Vec<SimultaneousImage<'a>>,
@@ -144,15 +144,15 @@ struct ProfileDocument<'a> {
     judged: bool,
     valid: bool,
     invalid_because: &'a [String],
-    /// Shots of tables without a position of the spacecraft: it is placed on the radius through the footprint at the
+    /// Shots of tables without a position of the spacecraft: the position is set on the radius through the footprint at the
     /// range, so that the test does not apply.
     shots_nadir_by_range: u32,
     range_minus_distance_m: Summary,
-    /// Mean without outliers, compared with the limit.
+    /// Mean without outliers, for comparison with the limit.
     mean_without_outliers_m: f64,
     range_minus_distance_crossover_m: Summary,
     decoding_m: Summary,
-    /// Its mean without the same shots, compared with the limit.
+    /// Mean of the decoding residuals without the same shots, for comparison with the limit.
     decoding_without_outliers_m: f64,
     spacecraft_radial_m: Summary,
     spacecraft_along_m: Summary,

@@ -345,7 +345,7 @@ fn ground<'a>() -> Vec<Column<Row<'a>>> {
 fn image<'a>() -> Vec<Column<Row<'a>>> {
     type Of = fn(Place) -> f64;
     let ours = "coordinate in the image, 0 at the leading edge of the first line or pixel, 0.5 at its centre";
-    let isis = "the same as in ISIS: 1 at the centre of the first line or pixel";
+    let isis = "coordinate in the image as in ISIS: 1 at the centre of the first line or pixel";
     let of: [([&'static str; 2], Unit, Of, &'static str); 4] = [
         (
             ["before_line", "adjusted_line"],
@@ -391,13 +391,13 @@ fn image<'a>() -> Vec<Column<Row<'a>>> {
     columns.push(column(
         "adjusted_inside",
         Unit::None,
-        "whether it does with the adjusted orientation; false if the site has no adjustment",
+        "whether the footprint lies inside with the adjusted orientation; false if the site has no adjustment",
         inside(1),
     ));
     columns.push(column(
         "extrapolated",
         Unit::None,
-        "whether one of these places lies beyond the first or last header line, where the orientation is extrapolated",
+        "whether one of these positions lies beyond the first or last header line, where the orientation is extrapolated",
         |row: &Row| row.places.iter().flatten().any(|place| place.extrapolated),
     ));
     columns.push(column(

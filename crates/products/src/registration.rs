@@ -50,7 +50,7 @@ const DEFINITIONS: [(&str, &str); 7] = [
     (
         "mean_step_lines",
         "mean |step| of each iteration over the points with a result, a converged point counts as 0: \
-        figure 4 of Shan et al. 2005",
+        Figure 4 of Shan et al. 2005",
     ),
     (
         "difference_lines",
@@ -146,7 +146,7 @@ pub(super) static TABLE: Declaration = Declaration {
 
 pub(super) static DOCUMENT: Declaration = Declaration {
     path: "registration.json",
-    what: "convergence of the published iterations on them, and the effect of the camera model",
+    what: "convergence of the published iterations for the footprints, and the effect of the camera model",
     readers: "scripts",
     rows: "images",
     role: Role::Data,
@@ -249,7 +249,7 @@ fn columns<'a>() -> Vec<Column<Registered<'a>>> {
         column(
             "range_m",
             Unit::Metre,
-            "distance from the camera's position to the footprint, metres",
+            "distance from the camera to the footprint, metres",
             |point: &Registered| point.get(|points| &points.range_m),
         ),
         column(

@@ -88,10 +88,10 @@ fn shots_head() -> std::result::Result<String, ProductError> {
 /// Columns that cannot be written.
 #[derive(Debug, thiserror::Error, Cause)]
 enum RowsError {
-    #[error("the column {name} holds {holds}; expected a number, a flag or text in each row")]
-    #[cause(Configuration: "write Parquet, which also holds lists and groups, or select other columns")]
+    #[error("the column {name} contains {holds}; expected a number, a flag or text in each row")]
+    #[cause(Configuration: "write Parquet, which also supports lists and groups, or select other columns")]
     Column { name: String, holds: String },
-    #[error("the column {GEOMETRY} is missing or holds no points")]
+    #[error("the column {GEOMETRY} is missing or contains no points")]
     #[cause(Input: "regenerate products of another version of areograph with this version")]
     NoPoints,
     #[error("columns of these rows differ from those of earlier rows")]

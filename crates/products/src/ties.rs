@@ -162,19 +162,19 @@ fn measured_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column(
             "sigma_line",
             Unit::Line,
-            "standard deviation of the measured line, where its file states it",
+            "standard deviation of the measured line, if the tie-point file states it",
             |row: &Measurement| Some(row.sigma_px?[0]),
         ),
         column(
             "sigma_sample",
             Unit::Pixel,
-            "standard deviation of the measured sample, where its file states it",
+            "standard deviation of the measured sample, if the tie-point file states it",
             |row: &Measurement| Some(row.sigma_px?[1]),
         ),
         column(
             "rejected",
             Unit::None,
-            "why the tie point was not used in the adjustment; empty if it was, and where the adjustment failed",
+            "reason why the adjustment did not use the tie point; empty if it did, or if the adjustment failed",
             |row: &Measurement| row.rejected.clone(),
         ),
     ]
@@ -299,14 +299,14 @@ fn adjusted_sigma_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column(
             "sigma_east_m",
             Unit::Metre,
-            "standard deviation of the adjusted point in east, metres; in the published model only of the agreement \
+            "standard deviation of the adjusted point towards east, metres; in the published model only of the agreement \
              between the images",
             |row: &Measurement| Some(row.adjusted?.0.local_sigmas_m()[0]),
         ),
         column(
             "sigma_north_m",
             Unit::Metre,
-            "standard deviation of the adjusted point in north, metres; in the published model only of the agreement \
+            "standard deviation of the adjusted point towards north, metres; in the published model only of the agreement \
              between the images",
             |row: &Measurement| Some(row.adjusted?.0.local_sigmas_m()[1]),
         ),
@@ -339,19 +339,19 @@ fn adjusted_sigma_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column(
             "correlation_east_north",
             Unit::None,
-            "correlation of the adjusted point's errors in east and north, -1 to 1",
+            "correlation of the east and north errors of the adjusted point, -1 to 1",
             |row: &Measurement| Some(local_correlation(row.adjusted?.0, 0, 1)),
         ),
         column(
             "correlation_east_up",
             Unit::None,
-            "correlation of the adjusted point's errors in east and height, -1 to 1",
+            "correlation of the east and height errors of the adjusted point, -1 to 1",
             |row: &Measurement| Some(local_correlation(row.adjusted?.0, 0, 2)),
         ),
         column(
             "correlation_north_up",
             Unit::None,
-            "correlation of the adjusted point's errors in north and height, -1 to 1",
+            "correlation of the north and height errors of the adjusted point, -1 to 1",
             |row: &Measurement| Some(local_correlation(row.adjusted?.0, 1, 2)),
         ),
     ]
@@ -362,37 +362,37 @@ fn residual_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column(
             "residual_along_px",
             Unit::Pixel,
-            "observed minus adjusted along the track, focal plane, image pixels",
+            "residual along the track in the focal plane, observed minus adjusted, image pixels",
             |row: &Measurement| Some(row.adjusted?.1.along_px.value),
         ),
         column(
             "residual_across_px",
             Unit::Pixel,
-            "observed minus adjusted across the track, focal plane, image pixels",
+            "residual across the track in the focal plane, observed minus adjusted, image pixels",
             |row: &Measurement| Some(row.adjusted?.1.across_px.value),
         ),
         column(
             "redundancy_along",
             Unit::None,
-            "fraction of an error of the measurement along the track that appears in its residual, 0 to 1",
+            "fraction of a measurement error along the track that appears in its residual, 0 to 1",
             |row: &Measurement| Some(row.adjusted?.1.along_px.redundancy),
         ),
         column(
             "redundancy_across",
             Unit::None,
-            "fraction of an error of the measurement across the track that appears in its residual, 0 to 1",
+            "fraction of a measurement error across the track that appears in its residual, 0 to 1",
             |row: &Measurement| Some(row.adjusted?.1.across_px.redundancy),
         ),
         column(
             "standardised_along",
             Unit::None,
-            "residual along the track over its own standard deviation; missing where it is uncontrolled",
+            "standardised residual along the track; missing for an uncontrolled measurement",
             |row: &Measurement| row.adjusted?.1.along_px.standardised,
         ),
         column(
             "standardised_across",
             Unit::None,
-            "residual across the track over its own standard deviation; missing where it is uncontrolled",
+            "standardised residual across the track; missing for an uncontrolled measurement",
             |row: &Measurement| row.adjusted?.1.across_px.standardised,
         ),
         column(

@@ -10,7 +10,7 @@ use areograph_stages::adjust::{BoresightSummary, ProfileOffset, SpotsOfImage};
 /// [`BoresightSummary`] without unknown values.
 #[derive(Serialize, JsonSchema)]
 pub(super) struct BoresightDocument<'a> {
-    /// Towards X of the bus, and at right angles to that and the beam.
+    /// Angles from the given laser direction: towards X of the bus, and perpendicular to X and the beam.
     angles_rad: [f64; 2],
     #[schemars(transform = none_negative)]
     sigma_rad: [f64; 2],
@@ -29,12 +29,12 @@ pub(super) struct BoresightDocument<'a> {
 struct SpotsDocument<'a> {
     image: &'a str,
     spots: usize,
-    /// Delay of its lines against the shots, with its standard deviation, where that is an unknown.
+    /// Delay of the image lines relative to the shots, with its standard deviation, if this delay is an unknown.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(transform = at("/prefixItems/1", "minimum", 0))]
     line_time_s: Option<(f64, f64)>,
-    /// Image positions of footprints from the initial orientation minus those from the mounting of the laser: along
-    /// the track in lines, across it in focal-plane pixels.
+    /// Image positions of footprints from the initial orientation minus positions from the laser mounting: along the
+    /// track in lines, across the track in focal-plane pixels.
     footprints_off: &'a [Summary; 2],
 }
 

@@ -6,14 +6,14 @@ use serde::Serialize;
 use areograph_base::schema::{at, none_negative};
 use areograph_stages::adjust::OtherReading;
 
-/// Positions of the tie points by the other reading of the disagreement of images.
+/// Positions of the tie points in the other reading of the disagreement between images.
 #[derive(Serialize, JsonSchema)]
 pub(super) struct OtherReadingDocument {
-    /// With its standard deviation, where this is the reading by it.
+    /// Offset of the attitude clock, with its standard deviation, if the other reading assumes this offset.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(transform = at("/prefixItems/1", "minimum", 0))]
     attitude_clock_s: Option<(f64, f64)>,
-    /// Towards east, north and up, from the mean of the adjusted tie points.
+    /// Shift of the mean tie point from its adjusted position, east, north and up.
     moved_m: [f64; 3],
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(transform = none_negative)]

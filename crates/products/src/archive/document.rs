@@ -18,7 +18,7 @@ use areograph_stages::{
 
 pub(super) static DOCUMENT: Declaration<WriteArchive> = Declaration {
     path: "archive.json",
-    what: "verdict, limits, files with their problems, statistics by off-nadir angle, error of positions",
+    what: "verdict, limits, files with their problems, statistics by off-nadir angle, position errors",
     readers: "scripts",
     rows: "files",
     role: Role::Metadata,
@@ -34,7 +34,7 @@ pub(super) static DOCUMENT: Declaration<WriteArchive> = Declaration {
 #[derive(Serialize, JsonSchema)]
 #[schemars(
     title = "Range check of an archive",
-    description = "archive.json of areograph: every shot of PEDR files against the kernels."
+    description = "archive.json of areograph: comparison of every shot of the PEDR files with the kernels."
 )]
 struct Document<'a> {
     /// Always `areograph archive ranges 1`.
@@ -50,22 +50,22 @@ struct Document<'a> {
     kernels: &'a [KernelUsed],
     /// Interpolation of spacecraft positions from the kernels.
     positions: Positions,
-    /// Shots of profiles within the limits by off-nadir angle, outliers left out.
+    /// Shots of profiles within the limits, by off-nadir angle, without outliers.
     off_nadir: Vec<OffNadirDocument>,
     /// Files that were checked.
     files: Vec<FileDocument<'a>>,
-    /// Copies of these files, which are not counted.
+    /// Copies of checked files, which are not counted.
     copies: &'a [FileCopy],
-    /// Files that could not be checked, or not read again for the products.
+    /// Files that could not be checked, or could not be read again for the products.
     failures: &'a [FileFailure],
 }
 
 /// Accuracy of tabulated positions.
 #[derive(Serialize, JsonSchema)]
 struct Positions {
-    /// Bound that the tables keep, metres.
+    /// Tolerance of the tabulated positions, metres.
     tolerance_m: f64,
-    /// Largest distance from CSPICE at instants not used for the tables, metres.
+    /// Largest distance from CSPICE positions at instants not used for the tables, metres.
     #[schemars(range(min = 0.0))]
     largest_error_m: f64,
 }
@@ -75,7 +75,7 @@ struct Positions {
 struct OffNadirDocument {
     /// From this angle, degrees.
     from_deg: f64,
-    /// To this one, degrees; absent for the last.
+    /// To this angle, degrees; absent for the last range.
     #[serde(skip_serializing_if = "Option::is_none")]
     to_deg: Option<f64>,
     /// Shots.
@@ -91,7 +91,7 @@ struct OffNadirDocument {
 /// A file.
 #[derive(Serialize, JsonSchema)]
 struct FileDocument<'a> {
-    /// Name without folders; the path where files in several folders have the same name.
+    /// File name without folders; the path if files in several folders have the same name.
     file: &'a str,
     /// BLAKE3 of its bytes.
     #[schemars(regex(pattern = "^[0-9a-f]{64}$"))]
@@ -104,7 +104,7 @@ struct FileDocument<'a> {
     shots: u64,
     /// Number of shots without a spacecraft position in the kernels.
     not_covered: u64,
-    /// Number of problems of records and label.
+    /// Number of problems in the records and the label.
     complaint_count: u64,
     /// The first of them.
     complaints: &'a [String],

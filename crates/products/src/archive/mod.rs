@@ -54,7 +54,7 @@ static PRODUCTS: &[&Declaration<WriteArchive>] = &[
 ];
 
 static REPORT: Declaration<WriteArchive> =
-    Declaration::report("the page of the archive", |path, of| {
+    Declaration::report("the report of the archive", |path, of| {
         write_text(path, of.page).map(|()| 0)
     });
 

@@ -12,7 +12,7 @@ use areograph_stages::check_archive::ArchiveProfile;
 
 pub(super) static TABLE: Declaration<WriteArchive> = Declaration {
     path: "profiles.parquet",
-    what: "statistics of ranges against the kernels, one row per profile: the shots of one file in one revolution",
+    what: "statistics of range minus distance, one row per profile (the shots of one file in one revolution)",
     readers: "scripts",
     rows: "profiles",
     role: Role::Data,
@@ -26,7 +26,7 @@ pub(super) static TABLE: Declaration<WriteArchive> = Declaration {
 
 pub(super) static CSV: Declaration<WriteArchive> = Declaration {
     path: "profiles.csv",
-    what: "statistics of ranges against the kernels per profile, as CSV",
+    what: "statistics of range minus distance per profile, as CSV",
     readers: "spreadsheets, scripts",
     rows: "profiles",
     role: Role::Data,
@@ -65,7 +65,7 @@ fn times<'a>() -> Vec<Column<&'a ArchiveProfile>> {
         column(
             "file",
             Unit::None,
-            "PEDR file; its path where files in several folders have the same name",
+            "name of the PEDR file; its path if files in several folders have the same name",
             |row: &Row| row.file.clone(),
         ),
         column(
@@ -77,19 +77,19 @@ fn times<'a>() -> Vec<Column<&'a ArchiveProfile>> {
         column(
             "part",
             Unit::None,
-            "number of the part: 1, and higher after pauses of more than 300 s",
+            "number of the part, from 1; a new part starts after a pause of more than 300 s",
             |row: &Row| row.part,
         ),
         column(
             "first_record",
             Unit::None,
-            "first record with a selected shot, counted from 1 with the label",
+            "number of the first record with a selected shot, from 1, label included",
             |row: &Row| row.first_record,
         ),
         column(
             "last_record",
             Unit::None,
-            "last record with a selected shot, counted from 1 with the label",
+            "number of the last record with a selected shot, from 1, label included",
             |row: &Row| row.last_record,
         ),
         column(
@@ -113,7 +113,7 @@ fn times<'a>() -> Vec<Column<&'a ArchiveProfile>> {
         column(
             "not_covered",
             Unit::None,
-            "shots without a position in the kernels: not checked",
+            "shots that were not checked, because the kernels contain no position",
             |row: &Row| row.not_covered,
         ),
         column(
@@ -143,7 +143,7 @@ fn ranges<'a>() -> Vec<Column<&'a ArchiveProfile>> {
         checked(
             "mean_without_outliers_m",
             Unit::Metre,
-            "mean of range minus distance without outliers: compared with the limit",
+            "mean of range minus distance without outliers, which is compared with the limit",
             |row| row.mean_without_outliers_m,
         ),
         checked(
@@ -179,13 +179,13 @@ fn ranges<'a>() -> Vec<Column<&'a ArchiveProfile>> {
         column(
             "outliers",
             Unit::None,
-            "shots farther from the median than 5 NMAD",
+            "shots more than 5 NMAD from the median",
             |row: &Row| row.outliers,
         ),
         checked(
             "crossover_mean_m",
             Unit::Metre,
-            "mean of range minus distance to the crossover-corrected footprint",
+            "mean of range minus distance between spacecraft (kernels) and crossover-corrected footprint",
             |row| row.crossover_mean_m,
         ),
         checked(
@@ -197,7 +197,7 @@ fn ranges<'a>() -> Vec<Column<&'a ArchiveProfile>> {
         checked(
             "decoding_without_outliers_m",
             Unit::Metre,
-            "decoding_mean_m without outliers: compared with the limit",
+            "decoding_mean_m without outliers, which is compared with the limit",
             |row| row.decoding_without_outliers_m,
         ),
     ]
@@ -209,26 +209,26 @@ fn orbits<'a>() -> Vec<Column<&'a ArchiveProfile>> {
         checked(
             "spacecraft_radial_m",
             Unit::Metre,
-            "mean position of the spacecraft in the file minus its position in the kernels, away from Mars",
+            "mean spacecraft position (PEDR file) minus spacecraft position (kernels), away from Mars",
             |row| row.spacecraft_m[0],
         ),
         checked(
             "spacecraft_along_m",
             Unit::Metre,
-            "mean position of the spacecraft in the file minus its position in the kernels, along the flight",
+            "mean spacecraft position (PEDR file) minus spacecraft position (kernels), along the flight",
             |row| row.spacecraft_m[1],
         ),
         checked(
             "spacecraft_cross_m",
             Unit::Metre,
-            "mean position of the spacecraft in the file minus its position in the kernels, along the orbit's angular \
+            "mean spacecraft position (PEDR file) minus spacecraft position (kernels), along the orbital angular \
              momentum",
             |row| row.spacecraft_m[2],
         ),
         column(
             "best_correction_s",
             Unit::Second,
-            "correction of time tags that minimises the spread of ranges; missing without a minimum",
+            "correction of time tags that minimises the spread of range minus distance; missing if the spread has no minimum",
             |row: &Row| row.best_correction_s,
         ),
         column(
@@ -240,7 +240,7 @@ fn orbits<'a>() -> Vec<Column<&'a ArchiveProfile>> {
         column(
             "best_correction_radius",
             Unit::None,
-            "radius of the footprints that gives the least spread: raw, or corrected by crossovers",
+            "footprint radius that gives the smallest spread: raw or crossover-corrected",
             |row: &Row| {
                 let word = row.best_correction_s.map(|_| row.correction_radius.word());
                 word.unwrap_or_default().to_owned()
@@ -249,13 +249,13 @@ fn orbits<'a>() -> Vec<Column<&'a ArchiveProfile>> {
         column(
             "share_of_limits",
             Unit::None,
-            "largest checked figure as a share of its limit: above 1 a limit is exceeded; missing where too few shots were checked",
+            "largest ratio of a checked value to its limit: above 1, a limit is exceeded; missing if too few shots were checked",
             |row: &Row| row.share_of_limits,
         ),
         column(
             "invalid_because",
             Unit::None,
-            "exceeded limits, in words; empty if there are none",
+            "exceeded limits, in words; empty if no limit is exceeded",
             |row: &Row| row.invalid_because.join("; "),
         ),
     ]

@@ -76,7 +76,7 @@ fn columns() -> Vec<Column<CheckedShot>> {
         column(
             "record",
             Unit::None,
-            "record of the file, counted from 1 with the label",
+            "number of the record in the file, from 1, label included",
             |row: &Row| row.record,
         ),
         column(
@@ -137,19 +137,19 @@ fn columns() -> Vec<Column<CheckedShot>> {
         column(
             "spacecraft_radial_m",
             Unit::Metre,
-            "position of the spacecraft in the file minus its position in the kernels, away from Mars",
+            "spacecraft position (PEDR file) minus spacecraft position (kernels), away from Mars",
             |row: &Row| Some(row.residuals?.spacecraft_m.x),
         ),
         column(
             "spacecraft_along_m",
             Unit::Metre,
-            "position of the spacecraft in the file minus its position in the kernels, along the flight",
+            "spacecraft position (PEDR file) minus spacecraft position (kernels), along the flight",
             |row: &Row| Some(row.residuals?.spacecraft_m.y),
         ),
         column(
             "spacecraft_cross_m",
             Unit::Metre,
-            "position of the spacecraft in the file minus its position in the kernels, along the orbit's angular momentum",
+            "spacecraft position (PEDR file) minus spacecraft position (kernels), along the orbital angular momentum",
             |row: &Row| Some(row.residuals?.spacecraft_m.z),
         ),
     ]

@@ -22,8 +22,8 @@ use areograph_stages::{
 
 pub(super) static DOCUMENT: Declaration<WriteCalibration> = Declaration {
     path: "calibration.json",
-    what: "parameters with standard deviations, combinations that ties do not determine, statistics after every \
-           step, of withheld control and of other orbits, verdict",
+    what: "parameters with standard deviations, combinations that tie points do not determine, statistics after \
+           every step, for withheld control and for other orbits, verdict",
     readers: "scripts",
     rows: "cameras",
     role: Role::Metadata,
@@ -56,24 +56,24 @@ struct Document<'a> {
     /// The lines of the camera.
     #[schemars(length(min = 2))]
     cameras: Vec<CameraDocument<'a>>,
-    /// Drift of the orbit, body-fixed, metres per image line: true minus the support data that were given. The
+    /// Drift of the orbit, body-fixed, metres per image line: true minus given support data. The
     /// offset angles absorb the constant part of the orbit error.
     drift_m_per_line: [Value; 3],
     /// Offset angles as determined by tie points only.
     tie_sight: TieSightDocument,
-    /// Test of heights of tie points against the ground between laser points; absent where these are too few.
+    /// Test of tie point heights against the ground between laser points; absent if the points are too few.
     #[serde(skip_serializing_if = "Option::is_none")]
     tie_ground: Option<TieGround>,
-    /// Figures before, and after every step.
+    /// Statistics before the first step, and after every step.
     steps: &'a [CalibrationStep],
-    /// The rounds of a calibration from pixels (other members are of the last); absent where points were read from
+    /// The rounds of a calibration from pixels (other members refer to the last round); absent where points were read from
     /// tables.
     #[serde(skip_serializing_if = "Option::is_none")]
     rounds: Option<RoundsDocument>,
     /// Results of withheld control; absent without control.
     #[serde(skip_serializing_if = "Option::is_none")]
     held_back: Option<&'a HeldBack>,
-    /// Residuals of the control that was used, over their expected size.
+    /// Residuals of the used control, divided by their expected size.
     #[serde(skip_serializing_if = "Option::is_none")]
     control_scatter: Option<Scatter>,
     /// Other orbits.
@@ -83,7 +83,7 @@ struct Document<'a> {
 /// A calibration in rounds.
 #[derive(Serialize, JsonSchema)]
 struct RoundsDocument {
-    /// Whether the rounds converged: half of the units shifted by less than half a cell, residuals of control
+    /// Whether the rounds converged: half of the units shifted by less than half a cell, and control residuals
     /// changed by less than 2 %.
     converged: bool,
     /// Largest number of rounds allowed.
@@ -94,40 +94,40 @@ struct RoundsDocument {
     rounds: Vec<RoundDocument>,
 }
 
-/// The numbers of a round: terrain model and units as the cameras of the round before see them, then the cameras.
+/// Statistics of a round: terrain model and units with the cameras of the preceding round, then the cameras.
 #[derive(Serialize, JsonSchema)]
 struct RoundDocument {
     /// From 1.
     round: u32,
     /// Tie points.
     ties: u64,
-    /// Root mean square residual of tie points in the worst line with the cameras of the terrain model, pixels.
+    /// Root mean square residual of tie points in the worst camera line, with the cameras of the terrain model, pixels.
     #[serde(skip_serializing_if = "Option::is_none")]
     model_tie_rms_px: Option<f64>,
-    /// Root mean square residual of tie points in the worst line with the cameras of this round, pixels.
+    /// Root mean square residual of tie points in the worst camera line, with the cameras of this round, pixels.
     #[serde(skip_serializing_if = "Option::is_none")]
     tie_rms_px: Option<f64>,
     /// Share of the cells of the terrain model that have a height.
     model_filled: f64,
-    /// Units of shots that calibrate.
+    /// Accepted units of shots for the calibration.
     units_kept: u64,
-    /// Such units that were refused.
+    /// Rejected units of shots for the calibration.
     units_refused: u64,
-    /// Units of shots withheld for validation.
+    /// Accepted units of shots withheld for validation.
     judging_kept: u64,
-    /// Such units that were refused.
+    /// Rejected units of shots withheld for validation.
     judging_refused: u64,
-    /// Median length of the shifts of kept units that calibrate, cells; absent where none was kept.
+    /// Median length of the shifts of accepted calibration units, cells; absent if no unit was accepted.
     #[serde(skip_serializing_if = "Option::is_none")]
     shift_cells: Option<f64>,
     /// Median of model minus laser height, metres.
     #[serde(skip_serializing_if = "Option::is_none")]
     bias_m: Option<f64>,
-    /// Residuals of control, root mean square over all lines.
+    /// Root mean square of the control residuals over all camera lines.
     control: PixelsAndMetres,
-    /// Residuals of withheld control, root mean square over all lines.
+    /// Root mean square of the withheld-control residuals over all camera lines.
     held_back: PixelsAndMetres,
-    /// Residuals of withheld control, over their expected size.
+    /// Residuals of withheld control, divided by their expected size.
     #[serde(skip_serializing_if = "Option::is_none")]
     held_back_scatter: Option<Scatter>,
     /// φ, ω and κ of every line, degrees, in the order of `cameras`.
@@ -141,20 +141,20 @@ struct RoundDocument {
 struct CameraDocument<'a> {
     /// Its name.
     camera: &'a str,
-    /// φ, about the flight (roll), degrees.
+    /// φ, rotation about the flight direction (roll), degrees.
     phi_deg: Value,
-    /// ω, about the axis across the flight (pitch), degrees.
+    /// ω, rotation about the axis across the flight (pitch), degrees.
     omega_deg: Value,
-    /// κ, about the axis that looks down (yaw), degrees.
+    /// κ, rotation about the downward axis (yaw), degrees.
     kappa_deg: Value,
-    /// Tangent across the flight: coefficients of the powers of s′, which is −1 at the first edge of the image and 1 at
-    /// the last.
+    /// Look-angle tangent across the flight: coefficients of the powers of s′, from −1 at the first edge of the image
+    /// to 1 at the last.
     m: &'a [Value],
-    /// Tangent along the flight: coefficients of the powers of s′.
+    /// Look-angle tangent along the flight: coefficients of the powers of s′.
     n: &'a [Value],
-    /// Both tangents in the given support data, across and along the flight.
+    /// Coefficients of both tangents in the given support data, across and along the flight.
     laboratory: &'a [Vec<f64>; 2],
-    /// Largest residual of these against the look directions of the given support data, pixels.
+    /// Largest residual of the `laboratory` tangents against the look directions of the given support data, pixels.
     #[schemars(range(min = 0.0))]
     laboratory_left_px: f64,
     /// Tangent of a pixel.
@@ -162,7 +162,7 @@ struct CameraDocument<'a> {
     pixel_tangent: f64,
     /// Samples.
     samples: u32,
-    /// Largest change of a look direction, pixels.
+    /// Largest change of a look direction in the calibration, pixels.
     #[schemars(range(min = 0.0))]
     moved_px: f64,
     /// Largest residual of the calibrated support data against the calibrated look directions, pixels.
@@ -173,7 +173,7 @@ struct CameraDocument<'a> {
 /// Offset angles as determined by tie points only.
 #[derive(Serialize, JsonSchema)]
 struct TieSightDocument {
-    /// Number of directions that tie points do not determine: with a standard deviation above one degree.
+    /// Number of directions that tie points do not determine (standard deviation above one degree).
     unseen: u32,
     /// Names of these.
     unseen_directions: Vec<String>,
@@ -184,7 +184,7 @@ struct TieSightDocument {
 /// A combination of all offset angles.
 #[derive(Serialize, JsonSchema)]
 struct DirectionDocument {
-    /// Standard deviation by tie points only, degrees; absent if unbounded.
+    /// Standard deviation from tie points only, degrees; absent if unbounded.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0))]
     sigma_deg: Option<f64>,
@@ -195,7 +195,7 @@ struct DirectionDocument {
 /// A component along a named combination of unit length.
 #[derive(Serialize, JsonSchema)]
 struct Component {
-    /// Its name, for example `common roll`.
+    /// Name of the combination, for example `common roll`.
     combination: String,
     /// The component.
     share: f64,

@@ -51,13 +51,13 @@ fn columns<'a>() -> Vec<Column<&'a ImageResult>> {
         column(
             "line",
             Unit::Line,
-            "measured line, 0 at the outer edge of the first",
+            "measured line coordinate, 0 at the outer edge of the first line",
             |row: &Row| row.place[0],
         ),
         column(
             "sample",
             Unit::Pixel,
-            "measured sample, 0 at the outer edge of the first",
+            "measured sample coordinate, 0 at the outer edge of the first sample",
             |row: &Row| row.place[1],
         ),
         column(

@@ -55,25 +55,25 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
         column(
             "left_out",
             Unit::None,
-            "whether it was rejected; position and standard deviations are then empty",
+            "whether the point was rejected; its position and standard deviations are then empty",
             |row: &Row| row.left_out,
         ),
         column(
             "longitude_deg",
             Unit::Degree,
-            "east longitude of the intersection of its images, -180 to 180 degrees",
+            "east longitude of the intersected point, -180 to 180 degrees",
             |row: &Row| row.place.map(|place| degrees(place[0])),
         ),
         column(
             "latitude_deg",
             Unit::Degree,
-            "{latitude} latitude of the intersection, degrees",
+            "{latitude} latitude of the intersected point, degrees",
             |row: &Row| row.place.map(|place| degrees(place[1])),
         ),
         column(
             "radius_m",
             Unit::Metre,
-            "distance of the intersection from the centre of the body, metres",
+            "distance of the intersected point from the centre of the body, metres",
             |row: &Row| row.place.map(|place| place[2]),
         ),
     ];
@@ -88,21 +88,21 @@ fn sigmas<'a>() -> [Column<Row<'a>>; 3] {
         column(
             "sigma_east_m",
             Unit::Metre,
-            "standard deviation east, of the measurement and of the calibration, metres; empty for a tie point whose height is not \
-             tested for errors such as those found at others",
+            "east standard deviation from measurement and calibration, metres; empty for a tie point if its height is not \
+             tested for the errors found at other points",
             |row: &Row| row.sigma_m.map(|sigma_m| sigma_m[0]),
         ),
         column(
             "sigma_north_m",
             Unit::Metre,
-            "standard deviation north, of the measurement and of the calibration, metres; empty where sigma_east_m is",
+            "north standard deviation from measurement and calibration, metres; empty where sigma_east_m is empty",
             |row: &Row| row.sigma_m.map(|sigma_m| sigma_m[1]),
         ),
         column(
             "sigma_up_m",
             Unit::Metre,
-            "standard deviation up, of the measurement and of the calibration, metres; empty \
-            where sigma_east_m is",
+            "up standard deviation from measurement and calibration, metres; empty where \
+             sigma_east_m is empty",
             |row: &Row| row.sigma_m.map(|sigma_m| sigma_m[2]),
         ),
     ]
@@ -114,19 +114,19 @@ fn offs<'a>() -> [Column<Row<'a>>; 3] {
         column(
             "off_east_m",
             Unit::Metre,
-            "of a laser point: intersected minus the laser's position, east, metres",
+            "intersected minus laser position of a laser point, east, metres",
             |row: &Row| row.off_m.map(|off_m| off_m[0]),
         ),
         column(
             "off_north_m",
             Unit::Metre,
-            "of a laser point: intersected minus the laser's position, north, metres",
+            "intersected minus laser position of a laser point, north, metres",
             |row: &Row| row.off_m.map(|off_m| off_m[1]),
         ),
         column(
             "off_up_m",
             Unit::Metre,
-            "of a laser point: intersected minus the laser's position, up, metres",
+            "intersected minus laser position of a laser point, up, metres",
             |row: &Row| row.off_m.map(|off_m| off_m[2]),
         ),
     ]

@@ -48,7 +48,7 @@ pub(crate) static LIDAR: Declaration = Declaration {
 
 pub(crate) static CONTROL: Declaration = Declaration {
     path: "exchange/adjusted.gcp",
-    what: "adjusted tie points as ground control; the images are called <image>.cub",
+    what: "adjusted tie points as ground control points; the images are named <image>.cub",
     readers: "Ames Stereo Pipeline",
     rows: "tie points",
     role: Role::Data,
@@ -66,7 +66,7 @@ pub(crate) static CONTROL: Declaration = Declaration {
     }),
     uses: &[Use {
         program: Program::StereoPipeline,
-        lines: "# Standard deviations along x, y, z, so not with --use-lon-lat-height-gcp-error:\n\
+        lines: "# Standard deviations are along x, y, z; do not add --use-lon-lat-height-gcp-error:\n\
                 bundle_adjust --datum {asp_datum} IMAGES CAMERAS adjusted.gcp -o run/out",
     }],
 };

@@ -48,13 +48,13 @@ struct Document<'a> {
     method: Method,
     /// The map.
     map: MapDocument,
-    /// Whether the result is usable.
+    /// Whether the triangulation is usable.
     verdict: &'a Verdict,
     /// Sums of the net.
     totals: &'a Totals,
     /// The bricks.
     bricks: &'a [BrickResult],
-    /// Seams between them; absent for a single brick.
+    /// Seams between bricks; absent for a single brick.
     #[serde(skip_serializing_if = "Option::is_none")]
     seams: Option<&'a Seams>,
 }

@@ -70,7 +70,7 @@ pub(super) fn group() -> Group {
 
 static COLUMNS: Declaration<WriteNet> = Declaration {
     path: "columns.json",
-    what: "units and meanings of the columns of all CSV files",
+    what: "units and descriptions of the columns of all CSV files",
     readers: "scripts",
     rows: "",
     role: Role::Metadata,
@@ -121,7 +121,7 @@ struct TableColumns {
 struct ColumnOfTable {
     /// Its name.
     name: &'static str,
-    /// Its unit; absent where it has none.
+    /// Unit of the column; absent for a column without a unit.
     #[serde(skip_serializing_if = "Option::is_none")]
     unit: Option<&'static str>,
     /// Meaning of its values.

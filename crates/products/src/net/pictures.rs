@@ -10,7 +10,7 @@ use areograph_stages::triangulate::PictureResult;
 
 pub(super) static TABLE: Declaration<WriteNet> = Declaration {
     path: "pictures.parquet",
-    what: "the four coefficients of every picture, its scale, angle and place",
+    what: "the four coefficients, scale, angle and position of every picture",
     readers: "scripts",
     rows: "pictures",
     role: Role::Data,
@@ -21,7 +21,7 @@ pub(super) static TABLE: Declaration<WriteNet> = Declaration {
 
 pub(super) static CSV: Declaration<WriteNet> = Declaration {
     path: "pictures.csv",
-    what: "coefficients, scale, angle and place of every picture, as CSV",
+    what: "coefficients, scale, angle and position of every picture, as CSV",
     readers: "spreadsheets, scripts",
     rows: "pictures",
     role: Role::Data,
@@ -73,43 +73,43 @@ fn columns<'a>() -> Vec<Column<&'a PictureResult>> {
         column(
             "sigma_scale",
             Unit::None,
-            "standard deviation of the scale, as a fraction of it, and of the angle, in radians",
+            "standard deviation of the scale, as a fraction of the scale, and of the angle, radians",
             |row: &Row| row.sigma_scale,
         ),
         column(
             "x_m",
             Unit::Metre,
-            "middle of the measured points, east on the map, metres",
+            "east coordinate of the middle of the measured points on the map, metres",
             |row: &Row| row.centre_m[0],
         ),
         column(
             "y_m",
             Unit::Metre,
-            "middle of the measured points, north on the map, metres",
+            "north coordinate of the middle of the measured points on the map, metres",
             |row: &Row| row.centre_m[1],
         ),
         column(
             "longitude_deg",
             Unit::Degree,
-            "east longitude of the middle, -180 to 180 degrees",
+            "east longitude of the middle of the measured points, -180 to 180 degrees",
             |row: &Row| degrees(row.centre_rad[0]),
         ),
         column(
             "latitude_deg",
             Unit::Degree,
-            "areocentric latitude of the middle, degrees",
+            "areocentric latitude of the middle of the measured points, degrees",
             |row: &Row| degrees(row.centre_rad[1]),
         ),
         column(
             "sigma_m",
             Unit::Metre,
-            "standard deviation of x_m, and of y_m, metres",
+            "standard deviation of x_m and of y_m, metres",
             |row: &Row| row.sigma_m,
         ),
         column(
             "ties",
             Unit::None,
-            "points that the picture shares with other pictures",
+            "number of points that the picture shares with other pictures",
             |row: &Row| row.ties,
         ),
         column(

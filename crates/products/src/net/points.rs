@@ -72,7 +72,7 @@ fn features<'a>(of: &NetProducts<'a>) -> Features<'a> {
         newest_utc: "1970-01-01T00:00:00.000",
         body: Body::Mars,
         frame: "Mars body-fixed, areocentric latitude, east longitude, in the frame in which the controls are given",
-        z: "z: 0, a plane triangulation has no heights".to_owned(),
+        z: "z: 0, because a plane triangulation has no heights".to_owned(),
         points: points.collect(),
         attributes: table(of),
     }
@@ -101,7 +101,7 @@ fn columns<'a>() -> Vec<Column<&'a PointResult>> {
         column(
             "pictures",
             Unit::None,
-            "pictures that determine the position of the point",
+            "number of pictures that determine the position of the point",
             |row: &&PointResult| row.pictures,
         )
         .in_gis(),
@@ -112,11 +112,11 @@ fn columns<'a>() -> Vec<Column<&'a PointResult>> {
             |row: &&PointResult| row.is_control,
         )
         .in_gis(),
-        column("x_m", Unit::Metre, "east on the map, metres", |row: &&PointResult| {
+        column("x_m", Unit::Metre, "east coordinate on the map, metres", |row: &&PointResult| {
             row.place_m[0]
         })
         .in_gis(),
-        column("y_m", Unit::Metre, "north on the map, metres", |row: &&PointResult| {
+        column("y_m", Unit::Metre, "north coordinate on the map, metres", |row: &&PointResult| {
             row.place_m[1]
         })
         .in_gis(),

@@ -25,7 +25,7 @@ pub struct ProfileDocument {
     pub id: String,
     /// Whether the profile is within the limits.
     pub valid: bool,
-    /// Measured range − distance to the spacecraft in the kernels, metres.
+    /// Measured range minus distance to the spacecraft in the kernels, metres.
     pub range_minus_distance_m: Summary,
     /// Number of outliers.
     pub outliers: u32,
