@@ -522,7 +522,11 @@ fn labels_that_contradict_the_file_are_refused() {
             "12:08:53.853Z",
             "begins 0.010 s away from utc_start",
         ),
-        ("= 407", "= 408", "expected 1078752, according to FILE_RECORDS"),
+        (
+            "= 407",
+            "= 408",
+            "expected 1078752, according to FILE_RECORDS",
+        ),
         (
             "LINES              = 400",
             "LINES = 399",

@@ -194,7 +194,12 @@ fn a_lost_database_is_made_again_and_the_loss_is_reported() {
     assert_eq!(status, 200, "{head}{body}");
     let loss = served.json("/api/v1/status")["database_loss"]["text"].clone();
     for text in [loss.as_str().unwrap(), &served.log()] {
-        for part in ["1 site, 1 run.", "Earlier tokens", "audit records", "token add"] {
+        for part in [
+            "1 site, 1 run.",
+            "Earlier tokens",
+            "audit records",
+            "token add",
+        ] {
             assert!(text.contains(part), "{part}: {text}");
         }
     }

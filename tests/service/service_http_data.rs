@@ -182,7 +182,12 @@ fn a_service_that_makes_a_lost_database_again_is_not_ready_and_states_the_loss_a
         status["database_loss"]["text"].as_str().unwrap().to_owned(),
         world.get("/").text(),
     ] {
-        for part in ["1 site, 4 runs", "Earlier tokens", "audit records", "token add"] {
+        for part in [
+            "1 site, 4 runs",
+            "Earlier tokens",
+            "audit records",
+            "token add",
+        ] {
             assert!(text.contains(part), "{part}: {text}");
         }
     }
