@@ -11,7 +11,7 @@ use areograph_stages::adjust::{Adjusted, CorrectedPoint, PointKind, RangeResidua
 
 pub(super) static TABLE: Declaration = Declaration {
     path: "adjusted_footprints.parquet",
-    what: "the footprints used in the adjustment",
+    what: "footprints used in the adjustment: coordinates, standard deviations and ranges",
     readers: "scripts",
     rows: "footprints",
     role: Role::Data,

@@ -207,12 +207,12 @@ fn comment(image: &AdjustedImage, to: &AdjustedKernels) -> String {
         )
     };
     format!(
-        "Orientation of image {id} after an adjustment; written by areograph {version}.\n\
-         Load it after the kernels of the mission. It is valid only for this image, which was exposed over\n\
+        "Adjusted orientation of image {id}; written by areograph {version}.\n\
+         Load this file after the mission kernels. It is valid only for this image, which was exposed over\n\
          {exposed}\n\
          (UTC of the first line {utc}). Where the adjustment found that lines were exposed later or earlier\n\
-         than their tags, the orientation of a line is stored at its tag: do not use\n\
-         this file to locate other observations of the same time, such as laser shots.\n\
+         than their tags, the orientation of a line is stored at its tag: do not use this file\n\
+         to locate other observations of the same time, such as laser shots.\n\
          \n\
          Positions: {spacecraft} relative to the centre of Mars, geometric, J2000, with the Mars rotation of the\n\
          IAU 2000 report (pck00008 to pck00010). {positions}\n\
@@ -238,18 +238,18 @@ fn comment(image: &AdjustedImage, to: &AdjustedKernels) -> String {
 const fn positions(light_time: LightTime) -> &'static str {
     match light_time {
         LightTime::Surface => {
-            "They were adjusted with light time to the\n\
+            "The positions were adjusted with light time to the\n\
              surface and aberration: an exposure has the position of the instant at which the light left the\n\
              ground. Programs that compute the spacecraft position from the centre of Mars (LT+S: ISIS, ALE) obtain\n\
              a different position."
         }
         LightTime::None | LightTime::Support => {
-            "They were adjusted without light time:\n\
+            "The positions were adjusted without light time:\n\
              an exposure has the position of its own instant. Programs that compute the spacecraft position from\n\
              the centre of Mars (LT+S: ISIS, ALE) obtain a different position."
         }
         LightTime::Centre => {
-            "They were adjusted as seen from the centre\n\
+            "The positions were adjusted as seen from the centre\n\
              of Mars with light time and aberration: programs that apply both (LT+S: ISIS, ALE)\n\
              obtain the adjusted positions."
         }

@@ -203,7 +203,7 @@ struct AdjustmentDocument<'a> {
     other_reading: Option<OtherReadingDocument>,
     #[serde(skip_serializing_if = "Option::is_none")]
     no_other_reading_because: Option<&'a str>,
-    /// Weighted sum of squared residuals before each step and after the last.
+    /// Weighted sum of squared residuals before each step and after the last step.
     #[schemars(length(min = 1), transform = none_negative)]
     weighted_squares: &'a [f64],
     images: Vec<ImageDocument<'a>>,

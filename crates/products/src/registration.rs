@@ -79,7 +79,7 @@ struct Document<'a> {
 /// Keys of `[registration]`.
 #[derive(Serialize, JsonSchema)]
 struct Configured {
-    /// The form of orientation that the configuration requires; otherwise each image states its own.
+    /// Form of orientation, if the configuration requires one; otherwise each image states its own.
     #[serde(skip_serializing_if = "Option::is_none")]
     model: Option<CameraModel>,
     /// Convergence limit of the published iterations.

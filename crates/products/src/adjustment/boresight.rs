@@ -19,7 +19,7 @@ pub(super) struct BoresightDocument<'a> {
     profile_shifts: &'a [ProfileOffset],
     /// Images without a simultaneous profile.
     without: &'a [String],
-    /// The unknown farthest from its a priori value, and its distance in standard deviations of the contradiction.
+    /// The unknown with the largest standardised residual of its a priori value, and this residual.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(transform = at("/prefixItems/1", "minimum", 0))]
     farthest: Option<&'a (String, f64)>,

@@ -42,21 +42,22 @@ pub(super) const DEFINITIONS: [(&str, &str); 15] = [
     ),
     (
         "correction, sigmas",
-        "X, Y and Z position in {frame}, metres, then rotations about the camera's x, y and z axis, radians; of each \
-         the coefficients of 1, t and t², t = 0 in the middle of the image and 1 at its end. M = exp([rotation]x) M before",
+        "X, Y and Z position in {frame}, metres, then rotations about the camera's x, y and z axes, radians: the \
+         coefficients of 1, t and t² of each, with t = 0 in the middle of the image and t = 1 at its end. \
+         M = exp([rotation]x) M before",
     ),
     (
         "sigmas",
-        "a priori variances times the variance factor. The published model treats image coordinates of footprints, \
-         which are not independent, as independent measurements: its standard deviations describe the agreement of the \
-         images, not the accuracy of heights and positions",
+        "standard deviations from a priori variances times the variance factor. The published model treats image \
+         coordinates of footprints, which are not independent, as independent measurements: its standard deviations \
+         describe the agreement of the images, not the accuracy of heights and positions",
     ),
     (
         "sigmas of images",
-        "of the camera at the exposure of a line. Position, pitch and line times are not separated along the track: the position \
-         at a line's tag may differ from the position at its exposure by the distance flown in line_time_sigma_s, \
-         and the rotation compensates for this on the ground. Use position and rotation together. The standard \
-         deviations do not contain a time bias (time_bias_s)",
+        "standard deviations of the camera pose at the exposure of a line. Position, pitch and line times are not \
+         separated along the track: the position at the tag of a line may differ from the position at its exposure by \
+         the distance flown in line_time_sigma_s, and the rotation compensates for this on the ground. Use position \
+         and rotation together. The standard deviations do not contain a time bias (time_bias_s)",
     ),
     (
         "sigmas_m of shots",
@@ -66,9 +67,9 @@ pub(super) const DEFINITIONS: [(&str, &str); 15] = [
     ),
     (
         "mean_sigma_m",
-        "of the error that all tie points share; standard deviations of single points contain it. The standard \
-         deviations without it are relative_sigma_east_m, relative_sigma_north_m and \
-         relative_sigma_up_m of ties.parquet",
+        "standard deviation of the error that all tie points share; standard deviations of single points contain this \
+         error. The standard deviations without the shared error are relative_sigma_east_m, \
+         relative_sigma_north_m and relative_sigma_up_m of ties.parquet",
     ),
     (
         "other_reading",
@@ -81,11 +82,11 @@ pub(super) const DEFINITIONS: [(&str, &str); 15] = [
         "boresight",
         "where adjustment.common_bus is yes: angles of the laser from the direction that the mounting and the altimeter file \
          give (towards X of the bus, and perpendicular to X and the beam), the offset of each recorded profile from its \
-         adjusted position, and the unknown farthest from its a priori value, in standard deviations of the contradiction",
+         adjusted position, and the unknown with the largest standardised residual of its a priori value",
     ),
     (
         "configured",
-        "a standard deviation above 1e300 leaves the unknown free; without blunder_limit and height_blunder_limit all tie \
+        "a standard deviation above 1e300 leaves the unknown free; without blunder_limit and height_blunder_limit, all tie \
          points are kept",
     ),
 ];

@@ -48,7 +48,7 @@ struct Document<'a> {
     mola_clock: &'a MolaClock,
     /// Kernels in load order.
     kernels: &'a [KernelUsed],
-    /// Interpolation of spacecraft positions from the kernels.
+    /// Interpolation accuracy of spacecraft positions from the kernels.
     positions: Positions,
     /// Shots of profiles within the limits, by off-nadir angle, without outliers.
     off_nadir: Vec<OffNadirDocument>,

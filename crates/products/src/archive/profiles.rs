@@ -71,7 +71,7 @@ fn times<'a>() -> Vec<Column<&'a ArchiveProfile>> {
         column(
             "orbit",
             Unit::None,
-            "orbit number in the file",
+            "orbit number in the PEDR file",
             |row: &Row| row.orbit,
         ),
         column(

@@ -82,7 +82,7 @@ fn columns() -> Vec<Column<CheckedShot>> {
         column(
             "shot",
             Unit::None,
-            "number of the shot in its frame, 1 to 20",
+            "number of the shot in its PEDR frame, 1 to 20",
             |row: &Row| u32::from(row.shot),
         ),
         column(
@@ -118,14 +118,14 @@ fn columns() -> Vec<Column<CheckedShot>> {
         column(
             "range_minus_distance_m",
             Unit::Metre,
-            "range minus distance between spacecraft (kernels) and raw footprint; missing where the kernels have no position",
+            "range minus distance between spacecraft (kernels) and raw footprint; missing where the kernels contain no position",
             |row: &Row| Some(row.residuals?.range_minus_distance_m),
         ),
         column(
             "range_minus_distance_crossover_m",
             Unit::Metre,
             "range minus distance between spacecraft (kernels) and crossover-corrected footprint; missing where the \
-             kernels have no position",
+             kernels contain no position",
             |row: &Row| Some(row.residuals?.range_minus_distance_crossover_m),
         ),
         column(

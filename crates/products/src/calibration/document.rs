@@ -47,9 +47,9 @@ struct Document<'a> {
     format: &'static str,
     /// Identifier of the calibration.
     calibration: &'a str,
-    /// The body that the camera observes, as in `config/bodies`.
+    /// The body that the camera observes, as named in `config/bodies`.
     body: &'static str,
-    /// Unknowns that tie points estimate before control is used.
+    /// Unknowns estimated from tie points before control is used.
     mode: CalibrationMode,
     /// Whether the result is usable.
     verdict: &'a Verdict,
@@ -59,9 +59,9 @@ struct Document<'a> {
     /// Drift of the orbit, body-fixed, metres per image line: true minus given support data. The
     /// offset angles absorb the constant part of the orbit error.
     drift_m_per_line: [Value; 3],
-    /// Offset angles as determined by tie points only.
+    /// Offset angles determined from tie points only.
     tie_sight: TieSightDocument,
-    /// Test of tie point heights against the ground between laser points; absent if the points are too few.
+    /// Test of tie point heights against the ground between laser points; absent if none could be tested.
     #[serde(skip_serializing_if = "Option::is_none")]
     tie_ground: Option<TieGround>,
     /// Statistics before the first step, and after every step.
@@ -70,7 +70,7 @@ struct Document<'a> {
     /// tables.
     #[serde(skip_serializing_if = "Option::is_none")]
     rounds: Option<RoundsDocument>,
-    /// Results of withheld control; absent without control.
+    /// Results for withheld control; absent without control.
     #[serde(skip_serializing_if = "Option::is_none")]
     held_back: Option<&'a HeldBack>,
     /// Residuals of the used control, divided by their expected size.
@@ -86,9 +86,9 @@ struct RoundsDocument {
     /// Whether the rounds converged: half of the units shifted by less than half a cell, and control residuals
     /// changed by less than 2 %.
     converged: bool,
-    /// Largest number of rounds allowed.
+    /// Maximum number of rounds.
     rounds_max: u32,
-    /// Edge of a cell of the terrain models, metres.
+    /// Edge length of the terrain model cells, metres.
     cell_m: f64,
     /// The rounds in order.
     rounds: Vec<RoundDocument>,
@@ -107,17 +107,17 @@ struct RoundDocument {
     /// Root mean square residual of tie points in the worst camera line, with the cameras of this round, pixels.
     #[serde(skip_serializing_if = "Option::is_none")]
     tie_rms_px: Option<f64>,
-    /// Share of the cells of the terrain model that have a height.
+    /// Share of terrain model cells with a height.
     model_filled: f64,
-    /// Accepted units of shots for the calibration.
+    /// Kept units of shots for the calibration.
     units_kept: u64,
     /// Rejected units of shots for the calibration.
     units_refused: u64,
-    /// Accepted units of shots withheld for validation.
+    /// Kept units of shots withheld for validation.
     judging_kept: u64,
     /// Rejected units of shots withheld for validation.
     judging_refused: u64,
-    /// Median length of the shifts of accepted calibration units, cells; absent if no unit was accepted.
+    /// Median length of the shifts of kept calibration units, cells; absent if no unit was kept.
     #[serde(skip_serializing_if = "Option::is_none")]
     shift_cells: Option<f64>,
     /// Median of model minus laser height, metres.
@@ -170,14 +170,14 @@ struct CameraDocument<'a> {
     isd_left_px: f64,
 }
 
-/// Offset angles as determined by tie points only.
+/// Offset angles determined from tie points only.
 #[derive(Serialize, JsonSchema)]
 struct TieSightDocument {
     /// Number of directions that tie points do not determine (standard deviation above one degree).
     unseen: u32,
     /// Names of these.
     unseen_directions: Vec<String>,
-    /// All directions, orthonormal, the least determined first.
+    /// Orthonormal directions, starting with the least determined direction.
     directions: Vec<DirectionDocument>,
 }
 

@@ -42,7 +42,7 @@ fn columns<'a>() -> Vec<Column<&'a ImageResult>> {
         column(
             "kind",
             Unit::None,
-            "tie, control (used) or held_back (withheld for validation)",
+            "kind of point: tie, control (used) or held_back (withheld for validation)",
             |row: &Row| row.kind.word().to_owned(),
         ),
         column("camera", Unit::None, "line of the camera", |row: &Row| {
@@ -69,29 +69,29 @@ fn columns<'a>() -> Vec<Column<&'a ImageResult>> {
         column(
             "before_across_px",
             Unit::Pixel,
-            "position computed with the uncalibrated camera (for a laser point, from its given coordinates) minus the measured position, across \
-             the flight, pixels",
+            "position computed with the uncalibrated camera (for a laser point, from its given coordinates) minus \
+             measured position, across the flight, pixels",
             |row: &Row| row.before_px.map(|before_px| before_px[0]),
         ),
         column(
             "before_along_px",
             Unit::Pixel,
-            "position computed with the uncalibrated camera (for a laser point, from its given coordinates) minus the measured position, \
-             along the flight, pixels",
+            "position computed with the uncalibrated camera (for a laser point, from its given coordinates) minus \
+             measured position, along the flight, pixels",
             |row: &Row| row.before_px.map(|before_px| before_px[1]),
         ),
         column(
             "after_across_px",
             Unit::Pixel,
-            "position computed with the calibrated camera and orbit (for a laser point, from its given coordinates) minus the measured \
-             position, across the flight, pixels",
+            "position computed with the calibrated camera and orbit (for a laser point, from its given coordinates) \
+             minus measured position, across the flight, pixels",
             |row: &Row| row.after_px.map(|after_px| after_px[0]),
         ),
         column(
             "after_along_px",
             Unit::Pixel,
-            "position computed with the calibrated camera and orbit (for a laser point, from its given coordinates) minus the measured \
-             position, along the flight, pixels",
+            "position computed with the calibrated camera and orbit (for a laser point, from its given coordinates) \
+             minus measured position, along the flight, pixels",
             |row: &Row| row.after_px.map(|after_px| after_px[1]),
         ),
     ]

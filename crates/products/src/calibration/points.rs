@@ -11,7 +11,7 @@ use areograph_stages::calibrate::PointResult;
 
 pub(super) static TABLE: Declaration<WriteCalibration> = Declaration {
     path: "points.parquet",
-    what: "every tie and laser point as located by the calibrated cameras, with standard deviations",
+    what: "every tie and laser point located by the calibrated cameras, with standard deviations",
     readers: "scripts",
     rows: "points",
     role: Role::Data,
@@ -22,7 +22,7 @@ pub(super) static TABLE: Declaration<WriteCalibration> = Declaration {
 
 pub(super) static CSV: Declaration<WriteCalibration> = Declaration {
     path: "points.csv",
-    what: "tie and laser points as located by the calibrated cameras, as CSV",
+    what: "tie and laser points located by the calibrated cameras, as CSV",
     readers: "spreadsheets, scripts",
     rows: "points",
     role: Role::Data,
@@ -49,7 +49,7 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
         column(
             "kind",
             Unit::None,
-            "tie, control (used) or held_back (withheld for validation)",
+            "kind of point: tie, control (used) or held_back (withheld for validation)",
             |row: &Row| row.kind.word().to_owned(),
         ),
         column(

@@ -156,7 +156,7 @@ fn quoted(text: &str) -> std::result::Result<String, ProductError> {
     match quote.filter(|_| !text.contains(char::is_control)) {
         Some(quote) => Ok(format!("{quote}{text}{quote}")),
         None => Err(refused(format!(
-            "{text:?}: expected a name without control characters and with at most one kind of quotes"
+            "{text:?}: expected a name without control characters and with at most one kind of quotation mark"
         ))),
     }
 }
