@@ -367,7 +367,7 @@ mod tests {
     fn the_verdict_comes_first_and_text_stays_text() {
         let found = comparison(&[("<nav>", 1.0), ("gsfc", 0.0), ("ipng", 8.0)]);
         let page = page_of(&found, &["<i>left out</i>".to_owned()]);
-        assert!(page.contains("Of 3 kernel sets &lt;nav&gt; is closest to the mean orbit"));
+        assert!(page.contains("Of 3 kernel sets, &lt;nav&gt; is closest to the mean orbit"));
         assert!(page.contains("2.000 m")); // 1 − (1 + 0 + 8) / 3
         assert!(page.contains("this depends on ipng") && page.contains("verdict remarks"));
         assert!(page.contains("id=\"orbits-minus-their-mean\""));

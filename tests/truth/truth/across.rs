@@ -112,7 +112,13 @@ fn the_published_model_is_judged_by_mola() {
     assert!(outcome.starts_with("exit 5\nisidis: INVALID"), "{outcome}");
     let truth_m = Judged::height_error_m(&mission(), &case.path("out"), "isidis");
     let words = outcome.split("tie points lie ").nth(1).unwrap();
-    let stated_m: f64 = words.split(" m from").next().unwrap().parse().unwrap();
+    let stated_m: f64 = words
+        .split(" m above")
+        .next()
+        .unwrap()
+        .replace('−', "-")
+        .parse()
+        .unwrap();
     // MOLA states the error that truth knows, to the errors of its surface: 2 m, four times.
     assert!((stated_m - truth_m).abs() < 8.0, "{stated_m} {truth_m}");
     assert!(truth_m.abs() > 20.0, "{truth_m}");

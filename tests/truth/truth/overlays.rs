@@ -170,7 +170,7 @@ fn pieces(page: &str) -> BTreeMap<String, (Picture, f64)> {
     let mut pieces = BTreeMap::new();
     for figure in figures {
         let caption = figure.split("<figcaption>").nth(1).unwrap();
-        let pixel_m = caption.split(" m a pixel").next().unwrap();
+        let pixel_m = caption.split(" m per pixel").next().unwrap();
         let pixel_m: f64 = pixel_m.rsplit(' ').next().unwrap().parse().unwrap();
         for image in figure.split("src=\"data:image/png;base64,").skip(1) {
             let (data, rest) = image.split_once('"').unwrap();
