@@ -68,7 +68,7 @@ fn shot_columns<'a>() -> Vec<Column<Shot<'a>>> {
         columns.push(column(
             initial,
             Unit::Metre,
-            "coordinate of the footprint, {frame}, metres",
+            "coordinate of the footprint before the adjustment, {frame}, metres",
             move |shot: &Shot| shot.0.initial.xyz_m[axis],
         ));
         columns.push(column(
@@ -138,7 +138,7 @@ fn local_columns<'a>() -> Vec<Column<Shot<'a>>> {
                 "relative_sigma_north_m",
                 "relative_sigma_up_m",
             ],
-            "standard deviation without the shift of the profile, metres, for differences between footprints of one profile",
+            "standard deviation without the shift of the profile, for differences between footprints of one profile, metres",
             CorrectedPoint::relative_sigmas_m,
         ),
     ];

@@ -202,7 +202,7 @@ fn comment(image: &AdjustedImage, to: &AdjustedKernels) -> String {
         "ISIS and ALE apply this offset: load the file as it is.".to_owned()
     } else {
         format!(
-            "ISIS and ALE always read the attitude {usual_s:.3} s from the exposure: do not use this\n\
+            "ISIS and ALE always read the attitude at an offset of {usual_s:.3} s: do not use this\n\
              file with them."
         )
     };

@@ -218,7 +218,7 @@ struct ImageDocument<'a> {
     #[schemars(extend("exclusiveMinimum" = 0))]
     line_period_s: f64,
     correction: &'a [f64; ORIENTATION_UNKNOWNS],
-    /// X, Y and Z of the spacecraft position in the PEDR file, metres, if it was the expected position.
+    /// Offset of the spacecraft in the PEDR file from the kernels, X, Y and Z, metres, if this is the a priori value.
     #[serde(skip_serializing_if = "Option::is_none")]
     pedr_orbit_m: Option<[f64; 3]>,
     #[schemars(transform = none_negative)]
@@ -237,7 +237,7 @@ pub const ADJUSTMENT: &str = "adjustment.json";
 
 pub(super) static DOCUMENT: Declaration = Declaration {
     path: ADJUSTMENT,
-    what: "tie points intersected before and after the adjustment, comparisons of image pairs, the adjustment itself",
+    what: "tie points intersected before and after the adjustment, comparisons of image pairs, and the adjustment",
     readers: "scripts",
     rows: "adjusted points",
     role: Role::Data,

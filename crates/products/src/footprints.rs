@@ -206,8 +206,8 @@ pub(super) fn schema() -> DocumentSchema {
     let table = Table::new(columns(), Vec::new()).for_gis();
     let schema = geojson::schema(
         "Footprints as GeoJSON",
-        "footprints.geojson of areograph: laser shots inside the windows, on the sphere of the body, latitudes at its centre; west > east in \
-         bbox when it crosses the antimeridian.",
+        "footprints.geojson of areograph: laser shots inside the windows, on the sphere of the body, with latitudes at its \
+         centre; west > east in a bbox that crosses the antimeridian.",
         &table.columns().cloned().collect::<Vec<_>>(),
     );
     DocumentSchema {
@@ -303,19 +303,19 @@ fn quality<'a>() -> Vec<Column<Shot<'a>>> {
         column(
             "attitude_flag",
             Unit::None,
-            "0 attitude known, 2 known for part of the frame, 3 unknown",
+            "attitude: 0 known, 2 known for part of the frame, 3 unknown",
             |shot: &Shot| u32::from(shot.get(|footprints| &footprints.attitude_flag)),
         ),
         column(
             "orbit_quality",
             Unit::None,
-            "0: orbit from JPL; 1 or more: number of the gravity model of the orbit",
+            "source of the orbit: 0 for JPL, otherwise the number of the gravity model",
             |shot: &Shot| u32::from(shot.get(|footprints| &footprints.orbit_quality)),
         ),
         column(
             "windows",
             Unit::None,
-            "identifiers of the windows that hold the shot, separated by semicolons",
+            "identifiers of the windows that contain the shot, separated by semicolons",
             |shot: &Shot| shot.names.windows(shot.row),
         )
         .last_in_gis(),
@@ -342,7 +342,7 @@ fn ground<'a>() -> Vec<Column<Shot<'a>>> {
         column(
             "latitude_areographic_deg",
             Unit::Degree,
-            "{latitude_of_maps} latitude, degrees, {frame} radii; as on older maps",
+            "{latitude_of_maps} latitude, degrees, {frame} radii; convention of older maps",
             Shot::areographic_deg,
         ),
     ]
@@ -384,19 +384,19 @@ fn heights<'a>() -> Vec<Column<Shot<'a>>> {
         column(
             "x_m",
             Unit::Metre,
-            "{frame} body-fixed X of the ground: with the radius that all stages use, metres",
+            "{frame} body-fixed X of the ground point, with the radius that all stages use, metres",
             |shot: &Shot| shot.xyz_m(0),
         ),
         column(
             "y_m",
             Unit::Metre,
-            "{frame} body-fixed Y of the ground: with the radius that all stages use, metres",
+            "{frame} body-fixed Y of the ground point, with the radius that all stages use, metres",
             |shot: &Shot| shot.xyz_m(1),
         ),
         column(
             "z_m",
             Unit::Metre,
-            "{frame} body-fixed Z of the ground: with the radius that all stages use, metres",
+            "{frame} body-fixed Z of the ground point, with the radius that all stages use, metres",
             |shot: &Shot| shot.xyz_m(2),
         ),
     ]
@@ -415,19 +415,19 @@ fn spacecraft<'a>() -> Vec<Column<Shot<'a>>> {
         column(
             "spacecraft_longitude_deg",
             Unit::Degree,
-            "east longitude of the spacecraft, the file's orbit, {frame}",
+            "east longitude of the spacecraft from the orbit in the file, degrees, {frame}",
             |shot: &Shot| degrees(shot.get(|footprints| &footprints.spacecraft_longitude_rad)),
         ),
         column(
             "spacecraft_latitude_deg",
             Unit::Degree,
-            "{latitude} latitude of the spacecraft, the file's orbit",
+            "{latitude} latitude of the spacecraft from the orbit in the file, degrees",
             |shot: &Shot| degrees(shot.get(|footprints| &footprints.spacecraft_latitude_rad)),
         ),
         column(
             "spacecraft_radius_m",
             Unit::Metre,
-            "distance of the spacecraft from the centre of {body}, the file's orbit",
+            "distance of the spacecraft from the centre of {body}, from the orbit in the file, metres",
             |shot: &Shot| shot.get(|footprints| &footprints.spacecraft_radius_m),
         ),
         column(
@@ -439,7 +439,8 @@ fn spacecraft<'a>() -> Vec<Column<Shot<'a>>> {
         column(
             "nadir_by_range",
             Unit::None,
-            "whether the file has no position of the spacecraft: it is then on the radius through the footprint, at range_m",
+            "whether the file lacks spacecraft positions: the position is then on the radius through the footprint, at \
+             range_m",
             |shot: &Shot| !states_spacecraft(shot.footprints, shot.row),
         ),
     ]

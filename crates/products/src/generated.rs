@@ -44,8 +44,8 @@ fn contents(of_sites: &[&'static Declaration]) -> impl Iterator<Item = Content> 
 pub fn documentation(of_sites: &[&'static Declaration]) -> String {
     let mut text = "# Products\n\n\
         Generated from the declarations in `crates/products/src`; `tests/products/generated.rs` reports when it is stale.\n\n\
-        Paths are relative to the site's folder, `<image>` stands for the identifier of an image. `manifest.json`, \
-        which is written last, records the inputs of all of them.\n\n\
+        Paths are relative to the site's folder; `<image>` stands for the identifier of an image. `manifest.json`, \
+        which is written last, records the inputs of all products.\n\n\
         | file | what it is | for | one for | rows | schema |\n|---|---|---|---|---|---|\n"
         .to_owned();
     for product in of_sites {

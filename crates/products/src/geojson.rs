@@ -140,7 +140,7 @@ pub(super) fn schema(title: &str, description: &str, attributes: &[Meaning]) -> 
             "name": { "type": "string" },
             "crs": closed(crs, &[]),
             "frame": {
-                "description": "The frame of the coordinates, and the offset of the CRS code's frame from it.",
+                "description": "Frame of the coordinates, and offset of the CRS code's frame from this frame.",
                 "type": "string",
                 "minLength": 1,
             },

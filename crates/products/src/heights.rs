@@ -20,7 +20,7 @@ use areograph_stages::{
 
 pub(super) static TABLE: Declaration = Declaration {
     path: "height_check.parquet",
-    what: "heights of tie points above the {altimeter} surface, and of footprints that both images of a pair show, \
+    what: "heights of tie points above the {altimeter} surface, and heights of footprints that both images of a pair show, \
            before and after the adjustment",
     readers: "scripts",
     rows: "tie points and footprints",
@@ -165,13 +165,13 @@ fn columns() -> Vec<Column<Compared>> {
         column(
             "kind",
             Unit::None,
-            "tie for a tie point, footprint for a footprint that both images of a pair show by the tie points",
+            "tie for a tie point, footprint for a footprint that both images of a pair show according to the tie points",
             |row: &Compared| row.kind.to_owned(),
         ),
         column(
             "tie",
             Unit::None,
-            "identifier of the tie point; profile and row of a footprint",
+            "identifier of the tie point, or profile and row of the footprint",
             |row: &Compared| row.id.clone(),
         ),
         column(
@@ -183,25 +183,25 @@ fn columns() -> Vec<Column<Compared>> {
         column(
             "longitude_deg",
             Unit::Degree,
-            "east longitude, degrees: of the adjusted point, or else of the intersected point",
+            "east longitude of the adjusted point, or else of the intersected point, degrees",
             |row: &Compared| Some(degrees(row.place()?.longitude_rad)),
         ),
         column(
             "latitude_deg",
             Unit::Degree,
-            "{latitude} latitude, degrees: of the adjusted point, or else of the intersected point",
+            "{latitude} latitude of the adjusted point, or else of the intersected point, degrees",
             |row: &Compared| Some(degrees(row.place()?.latitude.0)),
         ),
         column(
             "nearest_shot_m",
             Unit::Metre,
-            "distance of the nearest shot in plan, metres",
+            "horizontal distance to the nearest shot, metres",
             |row: &Compared| Some(row.latest()?.nearest_shot_m),
         ),
         column(
             "surface_sigma_m",
             Unit::Metre,
-            "standard deviation of the {altimeter} surface at this point, metres; missing for footprints, which are its shots",
+            "standard deviation of the {altimeter} surface at this point, metres; missing for footprints",
             |row: &Compared| row.latest()?.surface_sigma_m,
         ),
         column(

@@ -72,7 +72,7 @@ pub(super) static ISD: Declaration = Declaration {
 
 pub(super) static ADJUSTED: Declaration = Declaration {
     path: "images/<image>/adjusted_isd.json",
-    what: "adjusted camera model; its positions follow the light-time convention of the run, like all others",
+    what: "adjusted camera model, with positions in the light-time convention of the run",
     readers: "usgscsm, Ames Stereo Pipeline, ISIS",
     rows: "table nodes",
     role: Role::Data,
@@ -339,8 +339,8 @@ fn provenance<'a>(
             epochs_compared_with_kernels: interpolation.epochs,
             error_max_px: interpolation.error_max_px,
             limit_px: InterpolationCheck::LIMIT_PX,
-            method: "Lagrange over uniform nodes, eighth order inside, lower towards the ends, of the positions \
-                     and the camera's quaternions turned to the body, as usgscsm does",
+            method: "Lagrange interpolation over uniform nodes, as in usgscsm, of positions and of camera quaternions \
+                     rotated to the body; eighth order inside, lower towards the ends",
             within_limit: interpolation.keeps_limit(),
         },
         kernels: kernels.collect(),
@@ -371,8 +371,8 @@ fn provenance<'a>(
                 match round {
                     Round::Initial | Round::Matching => "",
                     Round::Adjusted => {
-                        ", turned by the correction and shifted as the lines are; it belongs to instrument_position, from which tie \
-                         points do not separate it along the track"
+                        ", rotated by the correction and shifted with the lines; the attitude belongs to \
+                         instrument_position, from which tie points do not separate it along the track"
                     }
                 },
             ),

@@ -18,7 +18,7 @@ use areograph_stages::describe_kernels::KernelLine;
 
 pub(super) static KERNELS: Declaration = Declaration {
     path: "exchange/kernels.json",
-    what: "kernels by type with the keys of SpiceQL, and under areograph hashes and coverage",
+    what: "kernels by type with the keys of SpiceQL; hashes and coverage under the key areograph",
     readers: "SpiceQL, scripts",
     rows: "kernels",
     role: Role::Data,
@@ -85,7 +85,7 @@ fn qualities(site: &SiteProducts) -> BTreeMap<String, &'static str> {
 #[schemars(
     title = "Kernels of a site",
     description = "exchange/kernels.json of areograph: kernel names by type, and qualities, as SpiceQL reports them; \
-                   the key `areograph` has the size, hash and coverage of each kernel.",
+                   the key `areograph` contains the size, hash and coverage of each kernel.",
     extend("dependentRequired" = {
         "mgs_ck_quality": ["ck"],
         "mgs_spk_quality": ["spk"],
@@ -103,7 +103,7 @@ struct Report<'a> {
     kernels: KernelsByType<'a>,
 }
 
-/// Names of the kernels by their types, and qualities, as SpiceQL and ALE list them.
+/// Kernel names by type, and kernel qualities, as in SpiceQL and ALE.
 #[derive(Serialize, JsonSchema)]
 pub(super) struct KernelsByType<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -193,8 +193,8 @@ fn report<'a>(site: &SiteProducts<'a>) -> Report<'a> {
     let [positions, attitudes] = site.required.of_all();
     let areograph = Extension {
         coverage: format!(
-            "intervals of TDB seconds past J2000 in which the kernel contains {whose}: its position in an spk, its attitude in \
-             a ck, whose gaps lie between the intervals"
+            "intervals, TDB seconds past J2000, in which an spk contains the position, or a ck the attitude, of {whose}; \
+             gaps of a ck lie between the intervals"
         ),
         wanted_positions_et_s: ends(&positions),
         wanted_attitudes_et_s: ends(&attitudes),

@@ -31,7 +31,7 @@ use areograph_stages::{
 
 const CONVENTIONS: [&str; 6] = [
     "frame: {body_name} body-fixed, {frame}, metres; straight rays to the ground start at the positions, see light_time",
-    "abscissa x: lines from the middle of the header image, positive along flight; x = (t - t_middle) / line period",
+    "abscissa x: lines from the middle of the header image, positive along the flight; x = (t - t_middle) / line period",
     "polynomial: value = c0 + c1 x + c2 x^2, coefficients from the constant upwards; residual = sample - polynomial; \
      RMSE divides by the number of samples (Shan et al. 2005, Table 4)",
     "angles: camera to {body} = [kappa]3 [phi]2 [omega]1, rotations of the frame; the matrix M from {body} to camera has \
@@ -44,7 +44,8 @@ const CONVENTIONS: [&str; 6] = [
 #[derive(Serialize, JsonSchema)]
 #[schemars(
     title = "Exterior orientation of an image",
-    description = "images/<id>/orientation.json of areograph: times, polynomial sensor models of first and second order with residuals (the paper's Table 4), and the rotation-vector form."
+    description = "images/<id>/orientation.json of areograph: times, polynomial sensor models of first and second order with \
+    residuals (Table 4 of Shan et al. 2005), and the rotation-vector form."
 )]
 struct Document<'a> {
     #[schemars(extend("const" = "areograph orientation 1"))]
@@ -54,12 +55,12 @@ struct Document<'a> {
     invalid_because: Vec<&'a str>,
     times: Times<'a>,
     conventions: [Cow<'static, str>; 6],
-    /// For the kernels' orientation: the other conventions see the boresight's ground point in the middle of the image
-    /// by these lines later, and at samples larger by these.
+    /// Image offsets of the other conventions, with the orientation from the kernels: later lines and larger samples of the
+    /// boresight's ground point in the middle of the image.
     light_time: &'a LightTimeEffect,
     #[schemars(range(min = 3))]
     samples: usize,
-    /// East longitude and areocentric latitude, degrees: along the first edge and back along the last.
+    /// Outline: east longitude and areocentric latitude, degrees, along the first edge and back along the last edge.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(length(min = 3))]
     outline_deg: Option<Vec<[f64; 2]>>,
@@ -82,7 +83,7 @@ struct Times<'a> {
     stop_et_s: f64,
     #[schemars(extend("exclusiveMinimum" = 0))]
     line_period_s: f64,
-    /// If the exposure changes inside the image: its pieces, in order; `line_period_s` is then their mean.
+    /// Pieces of the image in order, if the exposure changes inside the image; `line_period_s` is then their mean line period.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     line_pieces: Vec<LinePieceDocument>,
     exposure_s: f64,

@@ -21,8 +21,8 @@ pub(super) static PAGE: Declaration = Declaration {
 
 pub(super) static OVERLAYS: Declaration = Declaration {
     path: "report/overlays.html",
-    what: "images with footprints and tie points on them, before and after the adjustment, and pairs of images of the \
-        same ground (for a site whose images have pixels)",
+    what: "images with marked footprints and tie points, before and after the adjustment, and pairs of images of the same \
+        ground (for a site with image pixels)",
     readers: "people",
     rows: "",
     role: Role::Overview,
@@ -37,7 +37,7 @@ pub(super) static OVERLAYS: Declaration = Declaration {
 
 pub(super) static METAKERNEL: Declaration = Declaration {
     path: "kernels.tm",
-    what: "the kernels of the site in their load order, as a metakernel",
+    what: "metakernel of the site kernels in load order",
     readers: "SPICE",
     rows: "",
     role: Role::Metadata,

@@ -37,7 +37,7 @@ pub const PAGE_DATA: &str = "report/page.postcard";
 
 pub(super) static DATA: Declaration = Declaration {
     path: PAGE_DATA,
-    what: "all data that the report shows, unrounded; BLAKE3 in the manifest, layout of this version of areograph",
+    what: "all data of the report, unrounded, in the layout of this version of areograph; BLAKE3 in the manifest",
     readers: "`areograph report`",
     rows: "",
     role: Role::Metadata,

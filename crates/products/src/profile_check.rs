@@ -14,8 +14,8 @@ use areograph_stages::check_profiles::{LeftOutProfile, ShiftedProfile, WithheldS
 
 pub(super) static DOCUMENT: Declaration = Declaration {
     path: "profiles.json",
-    what: "crossovers of the profiles, their shifts, profiles that do not belong to the others, and every profile predicted from the \
-           others by the surface between shots",
+    what: "crossovers of the profiles, profile shifts, profiles that contradict the others, and predictions of every profile \
+           from the others by the surface between shots",
     readers: "scripts",
     rows: "crossovers",
     role: Role::Data,
@@ -40,7 +40,7 @@ const DEFINITIONS: [(&str, &str); 5] = [
     ),
     (
         "shifts",
-        "how far a profile is recorded to the east, to the north and above its true position, from its crossovers and the a priori \
+        "east, north and upward shift of a recorded profile from its true position, according to its crossovers and the a priori \
          standard deviations (profile_plan_sigma_m, profile_sigma_m), with its covariance",
     ),
     (
@@ -51,7 +51,7 @@ const DEFINITIONS: [(&str, &str); 5] = [
     (
         "withheld",
         "stretches of up to 60 shots, predicted from the shots of all other profiles: mean of measured minus predicted heights, its \
-         stated standard deviation, and the shares inside the intervals that state 68.27, 95 and 99.7 % (Student's distribution \
+         stated standard deviation, and the shares inside the stated intervals of 68.27, 95 and 99.7 % (Student's distribution \
          with three degrees of freedom)",
     ),
 ];
@@ -59,14 +59,15 @@ const DEFINITIONS: [(&str, &str); 5] = [
 #[derive(Serialize, JsonSchema)]
 #[schemars(
     title = "Profiles of a site",
-    description = "profiles.json of areograph: the altimeter's profiles against each other at their crossovers, and the surface between shots tested on withheld profiles. Metres and degrees; unknown values are omitted."
+    description = "profiles.json of areograph: comparison of the altimeter's profiles at their crossovers, and test of the \
+                   surface between shots on withheld profiles. Metres and degrees; unknown values are omitted."
 )]
 struct Document<'a> {
     #[schemars(extend("const" = "areograph profiles 1"))]
     format: &'static str,
     site: &'a str,
     definitions: Vec<Definition>,
-    /// The radius that all stages take for the ground; omitted where the shots have one radius.
+    /// Ground radius that all stages use; omitted if the shots have one radius.
     #[serde(skip_serializing_if = "Option::is_none")]
     ground_radius: Option<GroundRadius>,
     /// Standard deviation of the radial error that the shots of a profile share, from crossovers and a priori.

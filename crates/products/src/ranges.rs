@@ -30,8 +30,8 @@ use areograph_stages::{
 const DEFINITIONS: [(&str, &str); 7] = [
     (
         "range_minus_distance",
-        "measured range minus |spacecraft in the kernels - footprint with the raw radius|, both in {frame}, as in \
-         Table 3 of the paper; the sign is a convention of areograph",
+        "measured range minus |spacecraft in the kernels - footprint with the raw radius|, both in {frame}, as in Table 3 of \
+         Shan et al. 2005; the sign is a convention of areograph",
     ),
     (
         "range_minus_distance_crossover",
@@ -39,13 +39,13 @@ const DEFINITIONS: [(&str, &str); 7] = [
     ),
     (
         "decoding",
-        "measured range minus |spacecraft in the {shot_file} - footprint with the raw radius|: tests \
-        the reading of the file without kernels",
+        "measured range minus |spacecraft in the {shot_file} - footprint with the raw radius|: a test, without kernels, that \
+        the file is read correctly",
     ),
     (
         "spacecraft_radial, _along, _cross",
         "spacecraft in the {shot_file} minus spacecraft in the kernels: away \
-        from {body}, along the flight, along the orbit's angular momentum",
+        from {body}, along the flight, along the orbital angular momentum",
     ),
     (
         "trend",
@@ -54,10 +54,9 @@ const DEFINITIONS: [(&str, &str); 7] = [
     ),
     (
         "bias_scan",
-        "spread of range_minus_distance against an assumed correction of the time tags; best_s is limited \
-        by its scatter and the orbit: uncertainty_s takes the mean difference of the two \
-        orbits as the error of either, a metre along the flight being 0.3 ms, and contains the slope of that difference and \
-        of the radii's correction along the profile",
+        "spread of range_minus_distance as a function of an assumed correction of the time tags. Scatter and orbit limit \
+        best_s: uncertainty_s uses the mean difference of the two orbits as the error of either (one metre along the flight is \
+        0.3 ms), and contains the slope of this difference and of the radius correction along the profile",
     ),
     (
         "summary",
@@ -79,7 +78,8 @@ fn each_once(rows: &[u32]) -> Vec<usize> {
 #[derive(Serialize, JsonSchema)]
 #[schemars(
     title = "Range check of a site",
-    description = "ranges.json of areograph: residuals of measured ranges per profile (the paper's Table 3), their limits and verdicts. Metres and seconds; unknown values are omitted."
+    description = "ranges.json of areograph: residuals of measured ranges per profile (Table 3 of Shan et al. 2005), their \
+                   limits and verdicts. Metres and seconds; unknown values are omitted."
 )]
 struct Document<'a> {
     #[schemars(extend("const" = "areograph ranges 1"))]
@@ -167,7 +167,7 @@ struct ProfileDocument<'a> {
 /// A scan without unknown members.
 #[derive(Serialize, JsonSchema)]
 struct Scan<'a> {
-    /// Radius of the footprints: the one with the smaller spread of ranges.
+    /// Footprint radius with the smaller spread of ranges.
     radius: ScannedRadius,
     correction_s: &'a [f64],
     spread_m: &'a [f64],

@@ -391,13 +391,14 @@ fn image<'a>() -> Vec<Column<Row<'a>>> {
     columns.push(column(
         "adjusted_inside",
         Unit::None,
-        "whether the footprint lies inside with the adjusted orientation; false if the site has no adjustment",
+        "whether the footprint lies inside the delivered image with the adjusted orientation; false without an adjustment",
         inside(1),
     ));
     columns.push(column(
         "extrapolated",
         Unit::None,
-        "whether one of these positions lies beyond the first or last header line, where the orientation is extrapolated",
+        "whether a position before or after the adjustment lies beyond the first or last header line, \
+         where the orientation is extrapolated",
         |row: &Row| row.places.iter().flatten().any(|place| place.extrapolated),
     ));
     columns.push(column(
@@ -413,8 +414,8 @@ fn image<'a>() -> Vec<Column<Row<'a>>> {
 fn adjusted<'a>() -> Vec<Column<Row<'a>>> {
     let names = ["sigma_east_m", "sigma_north_m", "sigma_up_m"];
     let columns = names.into_iter().enumerate().map(|(axis, name)| {
-        let meaning = "standard deviation in east, north or height after the adjustment, metres, including that of the shift of its \
-                       profile; missing for footprints that are not part of the adjustment";
+        let meaning = "standard deviation in east, north or height after the adjustment, including the shift of the profile, \
+                       metres; missing for footprints that are not part of the adjustment";
         column(name, Unit::Metre, meaning, move |row: &Row| {
             Some(row.adjusted?.local_sigmas_m()[axis])
         })

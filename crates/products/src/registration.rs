@@ -34,12 +34,12 @@ const DEFINITIONS: [(&str, &str); 7] = [
     ),
     (
         "light_time",
-        "the camera positions to which lines and samples belong; for the other conventions the offset of the ground in the middle \
-        of the image, later in lines and larger in samples",
+        "light-time convention of the camera positions to which lines and samples belong; for each other convention, the \
+        offset of the ground in the middle of the image, positive towards later lines and larger samples",
     ),
     (
         "methods",
-        "the published iterations, on the points within the image's lines: frame_first (Konecny et al. 1987, \
+        "published iterations for the points within the image's lines: frame_first (Konecny et al. 1987, \
         Wang 1990; with first_order: Shan, Lee & Yoon 2002) and fixed_point (eq. 4 of Shan et al. 2005)",
     ),
     (
@@ -49,7 +49,7 @@ const DEFINITIONS: [(&str, &str); 7] = [
     ),
     (
         "mean_step_lines",
-        "mean |step| of each iteration over the points with a result, a converged point counts as 0: \
+        "mean |step| of each iteration over the points with a result, where a converged point counts as 0: \
         Figure 4 of Shan et al. 2005",
     ),
     (
@@ -69,7 +69,7 @@ struct Document<'a> {
     site: &'a str,
     #[schemars(length(min = 1))]
     definitions: Vec<Definition>,
-    /// The radius that all stages take for the ground; omitted where the shots have one radius.
+    /// Ground radius that all stages use; omitted if the shots have one radius.
     #[serde(skip_serializing_if = "Option::is_none")]
     ground_radius: Option<GroundRadius>,
     configured: Configured,
@@ -79,7 +79,7 @@ struct Document<'a> {
 /// Keys of `[registration]`.
 #[derive(Serialize, JsonSchema)]
 struct Configured {
-    /// Form of orientation, if the configuration requires one; otherwise each image states its own.
+    /// Form of orientation, if the configuration requires one; otherwise each image states its form.
     #[serde(skip_serializing_if = "Option::is_none")]
     model: Option<CameraModel>,
     /// Convergence limit of the published iterations.

@@ -299,14 +299,14 @@ fn adjusted_sigma_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column(
             "sigma_east_m",
             Unit::Metre,
-            "standard deviation of the adjusted point towards east, metres; in the published model only of the agreement \
+            "standard deviation of the adjusted point in east, metres; in the published model only of the agreement \
              between the images",
             |row: &Measurement| Some(row.adjusted?.0.local_sigmas_m()[0]),
         ),
         column(
             "sigma_north_m",
             Unit::Metre,
-            "standard deviation of the adjusted point towards north, metres; in the published model only of the agreement \
+            "standard deviation of the adjusted point in north, metres; in the published model only of the agreement \
              between the images",
             |row: &Measurement| Some(row.adjusted?.0.local_sigmas_m()[1]),
         ),
@@ -320,8 +320,8 @@ fn adjusted_sigma_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column(
             "relative_sigma_east_m",
             Unit::Metre,
-            "standard deviation in east without the error that all tie points share, metres: of the difference from their mean; \
-             the shared error does not average out and is adjustment/heights/mean_sigma_m of adjustment.json",
+            "standard deviation in east without the error that all tie points share, for differences from their mean, metres; \
+             the shared error (adjustment/heights/mean_sigma_m of adjustment.json) does not average out",
             |row: &Measurement| Some(row.adjusted?.0.relative_sigmas_m()?[0]),
         ),
         column(
@@ -374,13 +374,13 @@ fn residual_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column(
             "redundancy_along",
             Unit::None,
-            "fraction of a measurement error along the track that appears in its residual, 0 to 1",
+            "redundancy number: share of a measurement error along the track that appears in the residual, 0 to 1",
             |row: &Measurement| Some(row.adjusted?.1.along_px.redundancy),
         ),
         column(
             "redundancy_across",
             Unit::None,
-            "fraction of a measurement error across the track that appears in its residual, 0 to 1",
+            "redundancy number: share of a measurement error across the track that appears in the residual, 0 to 1",
             |row: &Measurement| Some(row.adjusted?.1.across_px.redundancy),
         ),
         column(

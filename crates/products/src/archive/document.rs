@@ -70,12 +70,12 @@ struct Positions {
     largest_error_m: f64,
 }
 
-/// Shots within a range of off-nadir angles.
+/// Shots within an interval of off-nadir angles.
 #[derive(Serialize, JsonSchema)]
 struct OffNadirDocument {
-    /// From this angle, degrees.
+    /// Lower limit of the angles, degrees.
     from_deg: f64,
-    /// To this angle, degrees; absent for the last range.
+    /// Upper limit of the angles, degrees; absent for the last interval.
     #[serde(skip_serializing_if = "Option::is_none")]
     to_deg: Option<f64>,
     /// Shots.
@@ -106,7 +106,7 @@ struct FileDocument<'a> {
     not_covered: u64,
     /// Number of problems in the records and the label.
     complaint_count: u64,
-    /// The first of them.
+    /// First problems in records and label.
     complaints: &'a [String],
 }
 

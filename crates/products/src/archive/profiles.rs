@@ -95,13 +95,13 @@ fn times<'a>() -> Vec<Column<&'a ArchiveProfile>> {
         column(
             "start_et_s",
             Unit::Second,
-            "corrected time of the first shot, ET seconds past J2000",
+            "corrected time of the first shot, TDB seconds past J2000",
             |row: &Row| row.start_et_s,
         ),
         column(
             "stop_et_s",
             Unit::Second,
-            "corrected time of the last shot, ET seconds past J2000",
+            "corrected time of the last shot, TDB seconds past J2000",
             |row: &Row| row.stop_et_s,
         ),
         column(

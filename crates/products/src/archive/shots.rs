@@ -88,13 +88,13 @@ fn columns() -> Vec<Column<CheckedShot>> {
         column(
             "et_tag_s",
             Unit::Second,
-            "time tag, ET seconds past J2000",
+            "time tag, TDB seconds past J2000",
             |row: &Row| row.et_tag_s,
         ),
         column(
             "et_s",
             Unit::Second,
-            "corrected time, ET seconds past J2000",
+            "corrected time, TDB seconds past J2000",
             |row: &Row| row.et_s,
         ),
         column(

@@ -79,7 +79,7 @@ pub fn write_gcp(
     );
     let _infallible = writeln!(text, "# {}", shared_in_words(shared_sigma_m));
     if shared_sigma_m.is_some() {
-        text += "# behind the identifier of a point: its standard deviations along x, y, z without that error, metres\n";
+        text += "# after the identifier of a point: standard deviations along x, y, z without the shared error, metres\n";
     }
     let measured = points.iter().filter(|point| !point.measures.is_empty());
     let mut number = 0;

@@ -26,7 +26,7 @@ const EDGE_TO_ISIS: f64 = 0.5;
 
 pub(crate) static NETWORK: Declaration = Declaration {
     path: "exchange/adjusted.pvl",
-    what: "the control network with adjusted points, their covariances and residuals, as text",
+    what: "control network with adjusted points, covariances and residuals, as text",
     readers: "ISIS",
     rows: "tie points",
     role: Role::Data,
@@ -44,7 +44,7 @@ pub(crate) static NETWORK: Declaration = Declaration {
 
 pub(crate) static RESIDUALS: Declaration = Declaration {
     path: "exchange/residuals.csv",
-    what: "residuals of tie points in jigsaw's format, with their standard deviations and redundancy",
+    what: "tie-point residuals in jigsaw's format, with standard deviations and redundancy numbers",
     readers: "users of jigsaw",
     rows: "measurements",
     role: Role::Data,
@@ -72,8 +72,8 @@ pub(crate) static POINTS: Declaration = Declaration {
 
 pub(crate) static IMAGES: Declaration = Declaration {
     path: "exchange/bundleout_images.csv",
-    what: "corrections of the orientations, in jigsaw's format over existing kernels: kilometres and degrees for powers of \
-           t, which is 0 in the middle of the image and 1 at its end; rotations about the camera's axes",
+    what: "orientation corrections in jigsaw's format, over existing kernels: kilometres and degrees for powers of \
+           t, which is 0 in the middle of the image and 1 at its end; rotations about the camera axes",
     readers: "users of jigsaw",
     rows: "images",
     role: Role::Data,
@@ -203,7 +203,7 @@ impl<'a> Joined<'a> {
             }
         };
         let description = format!(
-            "tie points of areograph, adjusted; {}; {}",
+            "adjusted tie points of areograph; {}; {}",
             self.site.config.body.names().short_frame,
             shared_in_words(shared_sigma_m(self.adjustment)),
         );

@@ -79,7 +79,7 @@ struct SharedError<'a> {
     adjusted_sigma_east_north_up: [f64; 3],
 }
 
-const SHARED: &str = "metres; all points of the profile share this shift: their matrices contain it, and it does not average out";
+const SHARED: &str = "metres; all points of the profile share this shift, which does not average out; their matrices include it";
 
 /// Members in the order of ISIS, which is alphabetical.
 #[derive(Serialize)]

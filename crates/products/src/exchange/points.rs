@@ -63,7 +63,7 @@ pub(super) fn shared_in_words(sigma_m: Option<[f64; 3]>) -> String {
         },
     );
     format!(
-        "all points share {size}: the standard deviations contain it, and it does not average out"
+        "all points share {size}: the standard deviations contain this error, which does not average out"
     )
 }
 

@@ -41,7 +41,7 @@ const STRETCH: [f64; 2] = [0.02, 0.98];
 
 pub(crate) static PROJECT: Declaration = Declaration {
     path: "exchange/site.qgz",
-    what: "QGIS project with the layers that the site has",
+    what: "QGIS project with the layers of the site",
     readers: "QGIS",
     rows: "",
     role: Role::Overview,

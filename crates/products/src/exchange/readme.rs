@@ -41,7 +41,7 @@ fn text(of: &Context) -> String {
     let site = of.site;
     let terms = site.config.terms();
     let mut text = format!(
-        "Products of the site {} for other programs. Commands are given for this folder.\n\n\
+        "Products of the site {} for other programs. Run the commands in this folder.\n\n\
          Frame: {}.\n\n",
         site.config.site,
         frame(site.config.body)
@@ -91,21 +91,21 @@ fn light_time(site: &SiteProducts) -> String {
     let others = match site.config.orientation.light_time {
         LightTime::Surface | LightTime::None | LightTime::Support => {
             format!(
-                "ISIS and ALE see the spacecraft from the centre of {} instead (LT+S), about 10 lines away: the files for them, lidar\n\
-                 data, ground control and adjusted kernels, fit after a run with light_time = \"centre\".",
+                "ISIS and ALE see the spacecraft from the centre of {} instead (LT+S), about 10 lines away. Lidar data, ground\n\
+                 control and adjusted kernels agree with ISIS and ALE only after a run with light_time = \"centre\".",
                 site.config.terms().body()
             )
         }
         LightTime::Centre => {
-            "ISIS and ALE do the same; other programs see the ground about 10 lines away."
+            "ISIS and ALE use the same convention; other programs see the ground about 10 lines away."
                 .to_owned()
         }
     };
     format!(
         "Camera models, lines and samples, ground control, lidar data and adjusted kernels follow one convention,\n{}.\n\
-         {others}\n../registration.json has the differences of the others for each image.\n\
-         Ranges of lidar data are geometric in every convention: jigsaw, which measures them from ISIS's position of the spacecraft, finds\n\
-         them up to 330 m in error.\n\n",
+         {others}\n../registration.json states the differences of the other conventions for each image.\n\
+         Ranges of lidar data are geometric in every convention: jigsaw computes ranges from the spacecraft position in ISIS\n\
+         and finds errors of up to 330 m.\n\n",
         convention(site)
     )
 }
@@ -149,9 +149,9 @@ fn about(program: Program, terms: &Terms<'_>) -> String {
     match program {
         Program::StereoPipeline => format!(
             "\
-            Ames Stereo Pipeline ({} is a sphere of {} m). Tables have radii instead of heights, so that the\n\
-            choice of a datum does not matter; the .json beside each names its columns, its --csv-format and its\n\
-            radii. The first line names the columns.",
+            Ames Stereo Pipeline ({} is a sphere of {} m). Tables contain radii instead of heights: the\n\
+            choice of a datum does not matter. The .json file of a table states its columns, --csv-format and\n\
+            radii. The first line of a table names the columns.",
             body.map().asp_datum,
             body.map().radius_m
         ),
@@ -159,20 +159,20 @@ fn about(program: Program, terms: &Terms<'_>) -> String {
         Program::Gis => format!(
             "GIS: {}, longitudes -180..180, {} latitudes; {}.\n\
              The dates inside the GeoPackage and the shapefile are those of the newest shot.\n\
-             QGIS: open site.qgz; single files by Layer > Add Layer > Add Vector Layer.",
+             QGIS: open site.qgz, or single files by Layer > Add Layer > Add Vector Layer.",
             crs_code(body),
             terms.latitude(),
             point_z_height(body)
         ),
         Program::CameraModel => "\
-            Community Sensor Model (usgscsm): image support data of the cameras. They differ from the\n\
-            files of ALE where those do not describe the camera: the time of a line includes the summing, samples\n\
+            Community Sensor Model (usgscsm): image support data of the cameras. These data differ from the\n\
+            ALE files where the latter do not describe the camera: the time of a line includes the summing, samples\n\
             and the detector's centre count from the detector's edge, there is no distortion, and the pointing covers\n\
-            the whole image. The member areograph.interpolation holds the measured interpolation error."
+            the whole image. The member areograph.interpolation states the measured interpolation error."
             .to_owned(),
         Program::AdjustedKernels => "\
             The adjusted site (../adjustment.json describes the adjustment and its accuracy).\n\
-            ../images/<image>/adjusted_isd.json is the adjusted camera. Kernels to be loaded after the original ones,\n\
+            ../images/<image>/adjusted_isd.json is the adjusted camera. Load these kernels after the original kernels,\n\
             each pair only for its image:"
             .to_owned(),
         Program::Catalogue => "STAC".to_owned(),

@@ -20,7 +20,7 @@ use areograph_config::ShotFormat;
 
 pub(crate) static LOLA_LIKE: Declaration = Declaration {
     path: "exchange/lola_like.csv",
-    what: "footprints as LOLA's reduced data records: UTC, longitude, latitude, radius km, range km, ...",
+    what: "footprints as LOLA's reduced data records: UTC, longitude, latitude, radius in km, range in km, ...",
     readers: "ISIS, Ames Stereo Pipeline",
     rows: "shots",
     role: Role::Data,
@@ -38,9 +38,9 @@ pub(crate) static LOLA_LIKE: Declaration = Declaration {
             program: Program::Isis,
             lines: "lrolola2isis from=lola_like.csv cubes=cubes.lis pointid={altimeter}???? to=lidar.json\n\
                     # Lidar points of ISIS need the line and sample at which each image sees the shot, which lrolola2isis\n\
-                    # computes (a site with tie points has them ready in lidar.json). It reads column 4, the radius after the\n\
-                    # crossover correction; the measured range of column 5 belongs to the radius before it, column 6. For\n\
-                    # range constraints exchange the two first:\n\
+                    # computes (lidar.json contains both for a site with tie points). The program reads column 4, the radius\n\
+                    # after the crossover correction; the range of column 5 belongs to column 6, the radius before the\n\
+                    # correction. For range constraints, first exchange columns 4 and 6:\n\
                     awk -F, -v OFS=, '{ t = $4; $4 = $6; $6 = t; print }' lola_like.csv > lola_raw.csv",
         },
     ],
@@ -68,7 +68,7 @@ pub(crate) static LOLA_LIKE_SIDECAR: Declaration = Declaration {
 
 pub(crate) static ODE: Declaration = Declaration {
     path: "exchange/ode_pts.csv",
-    what: "footprints as the Orbital Data Explorer's points",
+    what: "footprints in the point format of the Orbital Data Explorer",
     readers: "Ames Stereo Pipeline",
     rows: "shots",
     role: Role::Data,
@@ -103,9 +103,9 @@ pub(crate) static ODE_SIDECAR: Declaration = Declaration {
     uses: &[],
 };
 
-const LOLA_LIKE_RADIUS: &str = "column 4 is the distance from the centre of {body} after the crossover correction, kilometres: \
-     for heights; column 6 is the distance before this correction, to which the range of column 5 belongs: for range \
-     constraints; no column is a height";
+const LOLA_LIKE_RADIUS: &str = "column 4, for heights, is the distance from the centre of {body} after the crossover correction, \
+     kilometres; column 6, for range constraints, is this distance before the correction, to which the range of column 5 \
+     belongs; no column is a height";
 const ODE_RADIUS: &str = "column 5 is the distance from the centre of {body} after the crossover correction, metres; \
      column 3 is this distance minus the radius of the {areoid}, not a height above a sphere";
 
@@ -113,7 +113,7 @@ const ODE_RADIUS: &str = "column 5 is the distance from the centre of {body} aft
 #[derive(Serialize, JsonSchema)]
 #[schemars(title = "Columns of a CSV file")]
 struct Sidecar {
-    /// The file that is described.
+    /// Name of the described file.
     file: &'static str,
     /// Options for `pc_align` of Ames Stereo Pipeline.
     csv_format: &'static str,
@@ -121,9 +121,9 @@ struct Sidecar {
     datum: &'static str,
     #[schemars(extend("exclusiveMinimum" = 0))]
     datum_radius_m: f64,
-    /// Definition of its radii.
+    /// Definition of the radii.
     radius: Cow<'static, str>,
-    /// Frame of its longitudes and latitudes.
+    /// Reference frame of the longitudes and latitudes.
     frame: &'static str,
     #[schemars(extend("const" = "east, 0..360"))]
     longitudes: &'static str,

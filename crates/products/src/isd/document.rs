@@ -40,8 +40,8 @@ pub(super) struct Isd<'a> {
     pub(super) name_model: &'static str,
     #[schemars(extend("const" = "lagrange"))]
     pub(super) interpolation_method: &'static str,
-    /// For every piece of the image: line coordinate from which it holds, time relative to `center_ephemeris_time`,
-    /// seconds per image line; a coordinate has the time of its row plus seconds per line × (coordinate − line + 0.5).
+    /// For every piece of the image: first line coordinate, time relative to `center_ephemeris_time`, seconds per image
+    /// line. The time of a coordinate is the time of its piece plus seconds per line × (coordinate − line + 0.5).
     #[schemars(length(min = 1))]
     pub(super) line_scan_rate: Vec<[f64; 3]>,
     pub(super) starting_ephemeris_time: f64,
@@ -69,7 +69,7 @@ pub(super) struct Isd<'a> {
     pub(super) areograph: Provenance<'a>,
 }
 
-/// Heights between which camera models search for the ground.
+/// Range of heights in which camera models search for the ground.
 #[derive(Serialize, JsonSchema)]
 pub(super) struct ReferenceHeight {
     pub(super) maxheight: i32,
@@ -93,7 +93,7 @@ pub(super) struct FocalLength {
     pub(super) focal_length: f64,
 }
 
-/// Detector pixels from the detector's edge.
+/// Position of the detector centre, pixels from the detector's edge.
 #[derive(Serialize, JsonSchema)]
 pub(super) struct DetectorCentre {
     pub(super) line: f64,
@@ -111,7 +111,7 @@ pub(super) struct Radial {
     pub(super) coefficients: [f64; 3],
 }
 
-/// A NAIF code, a count, a number or three.
+/// A NAIF code, a count, or one or three numbers.
 #[derive(Serialize, JsonSchema)]
 #[serde(untagged)]
 pub(super) enum Keyword {
@@ -136,7 +136,7 @@ pub(super) struct Rotation {
     pub(super) reference_frame: i32,
 }
 
-/// From J2000 to the bus, and from the bus to the camera.
+/// Rotations from J2000 to the bus, and from the bus to the camera.
 #[derive(Serialize, JsonSchema)]
 pub(super) struct InstrumentPointing {
     #[serde(flatten)]
@@ -146,7 +146,7 @@ pub(super) struct InstrumentPointing {
     pub(super) constant_rotation: Vec<f64>,
 }
 
-/// Kilometres and kilometres per second from the centre of Mars, J2000.
+/// Positions and velocities relative to the centre of Mars, J2000, kilometres and kilometres per second.
 #[derive(Serialize, JsonSchema)]
 #[allow(clippy::struct_field_names, reason = "the keys that usgscsm reads")]
 pub(super) struct Positions {
@@ -170,7 +170,7 @@ pub(super) struct Provenance<'a> {
     /// All kernels in load order.
     #[schemars(length(min = 1))]
     pub(super) kernels: Vec<KernelName<'a>>,
-    /// Convention of the positions, and offsets of the image by the others, with the kernels' orientation.
+    /// Light-time convention of the positions, and image offsets of the other conventions, with the orientation from kernels.
     pub(super) light_time: &'a LightTimeEffect,
     pub(super) line_period_s: f64,
     pub(super) lines_header: u32,
@@ -184,7 +184,7 @@ pub(super) struct Provenance<'a> {
 /// Interpolation error of the tables, measured against the kernels.
 #[derive(Serialize, JsonSchema)]
 pub(super) struct Interpolation {
-    /// 0 where the nodes come from support data, and there is nothing to compare with.
+    /// Number of compared epochs; 0 if the nodes come from support data, without kernels for comparison.
     pub(super) epochs_compared_with_kernels: usize,
     #[schemars(range(min = 0.0))]
     pub(super) error_max_px: f64,

@@ -53,13 +53,13 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
         column(
             "line",
             Unit::Line,
-            "image line of the position in the model, 0 at the outer edge of the first",
+            "image line of the position in the model, 0 at the outer edge of the first line",
             |row: &Row| row.place[0],
         ),
         column(
             "sample",
             Unit::Pixel,
-            "image sample of the position in the model, 0 at the outer edge of the first",
+            "image sample of the position in the model, 0 at the outer edge of the first sample",
             |row: &Row| row.place[1],
         ),
         column(
@@ -77,19 +77,19 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
         column(
             "radius_m",
             Unit::Metre,
-            "distance from the centre of Mars by the laser, metres",
+            "distance from the centre of Mars according to the laser, metres",
             |row: &Row| row.point.laser[2],
         ),
         column(
             "sigma_matching_horizontal_m",
             Unit::Metre,
-            "standard deviation of a horizontal coordinate from the matching, metres; calibrations add it to the laser's own",
+            "standard deviation of a horizontal coordinate from the matching, metres; calibrations add the laser's own error",
             |row: &Row| row.point.sigma_horizontal_m(),
         ),
         column(
             "sigma_matching_vertical_m",
             Unit::Metre,
-            "standard deviation of the radius by the matching, metres; calibrations add it to the laser's own",
+            "standard deviation of the radius from the matching, metres; calibrations add the laser's own error",
             |row: &Row| row.point.sigma_m[2],
         ),
     ]

@@ -12,7 +12,7 @@ use areograph_stages::match_laser::MatchedPoint;
 
 pub(super) static TABLE: Declaration<WriteMatch> = Declaration {
     path: "control_points.parquet",
-    what: "a laser control point of every unit that is kept: its position from the laser and in the model",
+    what: "laser control points of the kept units, with positions from the laser and in the model",
     readers: "scripts",
     rows: "points",
     role: Role::Data,
@@ -43,7 +43,7 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
         column(
             "point",
             Unit::None,
-            "PEDR file, record and shot of the used shot of the unit that is nearest to the bias",
+            "PEDR file, record and number of the used shot of the unit that is nearest to the bias",
             |row: &Row| row.name.clone(),
         ),
         column("unit", Unit::None, "number of the unit", |row: &Row| {
@@ -64,7 +64,7 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
         column(
             "radius_m",
             Unit::Metre,
-            "distance from the centre of Mars by the laser, metres",
+            "distance from the centre of Mars according to the laser, metres",
             |row: &Row| row.laser[2],
         ),
         column(
@@ -88,13 +88,13 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
         column(
             "sigma_east_m",
             Unit::Metre,
-            "standard deviation of model minus laser in east, by the matching only, metres",
+            "standard deviation of model minus laser towards east, from the matching only, metres",
             |row: &Row| row.sigma_m[0],
         ),
         column(
             "sigma_north_m",
             Unit::Metre,
-            "standard deviation of model minus laser in north, by the matching only, metres",
+            "standard deviation of model minus laser towards north, from the matching only, metres",
             |row: &Row| row.sigma_m[1],
         ),
         column(

@@ -12,7 +12,7 @@ use areograph_stages::match_laser::UnitResult;
 
 pub(super) static TABLE: Declaration<WriteMatch> = Declaration {
     path: "units.parquet",
-    what: "every unit of laser shots: its shift, its validation by withheld shots, and whether it is kept, else the \
+    what: "units of laser shots: shift, validation by withheld shots, and whether the unit is kept, or else the \
         reason",
     readers: "scripts",
     rows: "units",
@@ -47,7 +47,7 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
         column(
             "kept",
             Unit::None,
-            "whether the unit is kept: it then has a control point",
+            "whether the unit is kept and has a control point",
             |row: &Row| row.is_kept(),
         ),
         column(
@@ -68,19 +68,19 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
         column(
             "strips",
             Unit::None,
-            "number of passes of its shots",
+            "number of passes with shots of the unit",
             |row: &Row| natural(row.strips),
         ),
         column(
             "radius_m",
             Unit::Metre,
-            "largest distance of a shot from the middle, metres",
+            "largest distance of a shot from the middle of the unit, metres",
             |row: &Row| row.radius_m,
         ),
         column(
             "relief_m",
             Unit::Metre,
-            "standard deviation of its laser heights, metres",
+            "standard deviation of the laser heights of the unit, metres",
             |row: &Row| row.relief_m,
         ),
     ];
@@ -138,20 +138,20 @@ fn deviations<'a>() -> [Column<Row<'a>>; 3] {
         column(
             "sigma_east_m",
             Unit::Metre,
-            "standard deviation of the shift to the east, by leaving out single shots and by the scatter of all units, metres",
+            "standard deviation of the eastward shift, from the omission of single shots and the scatter of all units, metres",
             |row: &Row| row.found.and_then(|found| Some(found.sigma?.shift_m[0])),
         ),
         column(
             "sigma_north_m",
             Unit::Metre,
-            "standard deviation of the shift to the north, by leaving out single shots and by the scatter of all units, \
+            "standard deviation of the northward shift, from the omission of single shots and the scatter of all units, \
              metres",
             |row: &Row| row.found.and_then(|found| Some(found.sigma?.shift_m[1])),
         ),
         column(
             "sigma_bias_m",
             Unit::Metre,
-            "standard deviation of `bias_m`, by leaving out single shots and by the scatter of all units, metres",
+            "standard deviation of `bias_m`, from the omission of single shots and the scatter of all units, metres",
             |row: &Row| row.found.and_then(|found| Some(found.sigma?.bias_m)),
         ),
     ]
@@ -174,27 +174,27 @@ fn judged<'a>() -> [Column<Row<'a>>; 7] {
         column(
             "bias_m",
             Unit::Metre,
-            "mean of model minus laser with the shift, over the shots that were used, metres",
+            "mean of model minus laser with the shift, over the used shots, metres",
             |row: &Row| row.found.map(|found| found.bias_m),
         ),
         column(
             "held_out_shots",
             Unit::None,
-            "shots withheld from the search, 0 where the model has too few heights for them",
+            "number of shots withheld from the search; 0 if the model has too few heights for them",
             |row: &Row| row.held_out.map_or(0, |held_out| natural(held_out.shots)),
         ),
         column(
             "held_out_before_m",
             Unit::Metre,
-            "root mean square of model minus laser at the withheld shots without the shift, about the bias of the shots that \
-             were used, metres",
+            "root mean square of model minus laser at the withheld shots without the shift, about the bias of the used \
+             shots, metres",
             |row: &Row| row.held_out.map(|held_out| held_out.before_m),
         ),
         column(
             "held_out_after_m",
             Unit::Metre,
-            "root mean square of model minus laser at the withheld shots with the shift, about the bias of the shots that \
-             were used, metres",
+            "root mean square of model minus laser at the withheld shots with the shift, about the bias of the used \
+             shots, metres",
             |row: &Row| row.held_out.map(|held_out| held_out.after_m),
         ),
         column(

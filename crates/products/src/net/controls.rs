@@ -9,7 +9,7 @@ use areograph_stages::triangulate::ControlResult;
 
 pub(super) static TABLE: Declaration<WriteNet> = Declaration {
     path: "controls.parquet",
-    what: "every control with its residual, and whether it was kept",
+    what: "controls with residuals, and whether each control was kept",
     readers: "scripts",
     rows: "controls",
     role: Role::Data,
@@ -20,7 +20,7 @@ pub(super) static TABLE: Declaration<WriteNet> = Declaration {
 
 pub(super) static CSV: Declaration<WriteNet> = Declaration {
     path: "controls.csv",
-    what: "controls with their residuals, as CSV",
+    what: "controls with residuals, as CSV",
     readers: "spreadsheets, scripts",
     rows: "controls",
     role: Role::Data,
@@ -42,38 +42,38 @@ fn columns<'a>() -> Vec<Column<&'a ControlResult>> {
         column(
             "x_m",
             Unit::Metre,
-            "east as given, metres on the map",
+            "given east coordinate on the map, metres",
             |row: &Row| row.given_m[0],
         ),
         column(
             "y_m",
             Unit::Metre,
-            "north as given, metres on the map",
+            "given north coordinate on the map, metres",
             |row: &Row| row.given_m[1],
         ),
         column(
             "dx_m",
             Unit::Metre,
-            "given minus computed, east, metres",
+            "given minus computed east coordinate, metres",
             |row: &Row| row.residual_m[0],
         ),
         column(
             "dy_m",
             Unit::Metre,
-            "given minus computed, north, metres",
+            "given minus computed north coordinate, metres",
             |row: &Row| row.residual_m[1],
         ),
         column(
             "scale_dx_m",
             Unit::Metre,
-            "given minus computed by SCALE of the free figure, east, metres: gross errors are detected from these",
+            "given minus computed east coordinate by SCALE of the free figure, metres; used to detect gross errors",
             |row: &Row| row.scale_residual_m[0],
         ),
         column(
             "scale_dy_m",
             Unit::Metre,
-            "given minus computed by SCALE of the free figure, north, metres: gross errors \
-            are detected from these",
+            "given minus computed north coordinate by SCALE of the free figure, metres; \
+            used to detect gross errors",
             |row: &Row| row.scale_residual_m[1],
         ),
         column(

@@ -9,7 +9,7 @@ use areograph_stages::triangulate::MeasurementResult;
 
 pub(super) static TABLE: Declaration<WriteNet> = Declaration {
     path: "deviations.parquet",
-    what: "every measurement with its deviation, the largest first; blunders are marked",
+    what: "measurements with deviations, the largest first; blunders are marked",
     readers: "scripts",
     rows: "measurements",
     role: Role::Data,
@@ -20,7 +20,7 @@ pub(super) static TABLE: Declaration<WriteNet> = Declaration {
 
 pub(super) static CSV: Declaration<WriteNet> = Declaration {
     path: "deviations.csv",
-    what: "measurements with their deviations, as CSV",
+    what: "measurements with deviations, as CSV",
     readers: "spreadsheets, scripts",
     rows: "measurements",
     role: Role::Data,
@@ -47,38 +47,38 @@ fn columns<'a>() -> Vec<Column<&'a MeasurementResult>> {
         column(
             "brick_dx_m",
             Unit::Metre,
-            "image minus mean of the point within its brick, east, metres; missing where the brick has one image",
+            "east deviation within the brick: image minus mean of the point, metres; missing if the brick has one image",
             |row: &Row| Some(row.in_brick?.x_m),
         ),
         column(
             "brick_dy_m",
             Unit::Metre,
-            "image minus mean of the point within its brick, north, metres; missing where \
+            "north deviation within the brick: image minus mean of the point, metres; missing if \
             the brick has one image",
             |row: &Row| Some(row.in_brick?.y_m),
         ),
         column(
             "dx_m",
             Unit::Metre,
-            "image minus mean of the point in the whole net, east, metres",
+            "east deviation in the whole net: image minus mean of the point, metres",
             |row: &Row| row.deviation.x_m,
         ),
         column(
             "dy_m",
             Unit::Metre,
-            "image minus mean of the point in the whole net, north, metres",
+            "north deviation in the whole net: image minus mean of the point, metres",
             |row: &Row| row.deviation.y_m,
         ),
         column(
             "redundancy",
             Unit::None,
-            "fraction of an error of this measurement that appears in its deviation, 0 to 1",
+            "fraction of a measurement error that appears in the deviation, 0 to 1",
             |row: &Row| row.redundancy,
         ),
         column(
             "flagged",
             Unit::None,
-            "whether the deviation is beyond 3.5 robust standard deviations of its brick",
+            "whether the deviation exceeds 3.5 robust standard deviations of its brick",
             |row: &Row| row.flagged,
         ),
         column(
@@ -90,25 +90,25 @@ fn columns<'a>() -> Vec<Column<&'a MeasurementResult>> {
         column(
             "x_m",
             Unit::Metre,
-            "the point on the map, east, metres",
+            "east coordinate of the point on the map, metres",
             |row: &Row| row.place_m[0],
         ),
         column(
             "y_m",
             Unit::Metre,
-            "the point on the map, north, metres",
+            "north coordinate of the point on the map, metres",
             |row: &Row| row.place_m[1],
         ),
         column(
             "picture_x",
             Unit::None,
-            "measured x, film corrected, units of the picture",
+            "measured x, corrected for the film, units of the picture",
             |row: &Row| row.at[0],
         ),
         column(
             "picture_y",
             Unit::None,
-            "measured y (upwards), film corrected, units of the picture",
+            "measured y (upwards), corrected for the film, units of the picture",
             |row: &Row| row.at[1],
         ),
     ]

@@ -62,7 +62,7 @@ struct Document<'a> {
 /// A conformal map of a sphere.
 #[derive(Serialize, JsonSchema)]
 struct MapDocument {
-    /// Mercator's or the stereographic projection.
+    /// Map projection: Mercator or stereographic.
     #[schemars(extend("enum" = ["mercator", "stereographic"]))]
     projection: &'static str,
     /// East longitude of the central meridian or centre, degrees.

@@ -61,7 +61,7 @@ fn columns<'a>() -> Vec<Column<&'a PictureResult>> {
         column(
             "metres_per_unit",
             Unit::None,
-            "size of a unit of the picture on the map, metres",
+            "length of a picture unit on the map, metres",
             |row: &Row| row.coefficients[0].hypot(row.coefficients[1]),
         ),
         column(
@@ -115,13 +115,14 @@ fn columns<'a>() -> Vec<Column<&'a PictureResult>> {
         column(
             "deviation_rms_m",
             Unit::Metre,
-            "root mean square of a coordinate of the picture's points from their means, metres",
+            "root mean square deviation, per coordinate, of the picture's points from their means, metres",
             |row: &Row| row.deviation_rms_m,
         ),
         column(
             "projection_floor_m",
             Unit::Metre,
-            "departure of an orthographic picture of its size from a similarity on this map, metres: a lower limit for any adjustment",
+            "projection floor: departure of an orthographic picture of this size from a similarity on the map, metres; lower \
+             limit for any adjustment",
             |row: &Row| row.projection_floor_m,
         ),
     ]

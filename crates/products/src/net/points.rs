@@ -71,7 +71,7 @@ fn features<'a>(of: &NetProducts<'a>) -> Features<'a> {
         // A net has no date; the machine's clock would give different bytes each time.
         newest_utc: "1970-01-01T00:00:00.000",
         body: Body::Mars,
-        frame: "Mars body-fixed, areocentric latitude, east longitude, in the frame in which the controls are given",
+        frame: "Mars body-fixed, areocentric latitude, east longitude, in the frame of the controls",
         z: "z: 0, because a plane triangulation has no heights".to_owned(),
         points: points.collect(),
         attributes: table(of),
@@ -123,7 +123,7 @@ fn columns<'a>() -> Vec<Column<&'a PointResult>> {
         column(
             "sigma_m",
             Unit::Metre,
-            "standard deviation of x_m, and of y_m, metres on the map; missing where it is not determined",
+            "standard deviation of x_m and of y_m, metres on the map; missing where undetermined",
             |row: &&PointResult| row.sigma_m,
         )
         .in_gis(),
