@@ -94,9 +94,12 @@ fn schema() -> DocumentSchema {
 
 fn columns<'a>() -> Vec<Column<&'a PointResult>> {
     vec![
-        column("point", Unit::None, "name of the point", |row: &&PointResult| {
-            row.point.clone()
-        })
+        column(
+            "point",
+            Unit::None,
+            "name of the point",
+            |row: &&PointResult| row.point.clone(),
+        )
         .in_gis(),
         column(
             "pictures",
@@ -112,13 +115,19 @@ fn columns<'a>() -> Vec<Column<&'a PointResult>> {
             |row: &&PointResult| row.is_control,
         )
         .in_gis(),
-        column("x_m", Unit::Metre, "east coordinate on the map, metres", |row: &&PointResult| {
-            row.place_m[0]
-        })
+        column(
+            "x_m",
+            Unit::Metre,
+            "east coordinate on the map, metres",
+            |row: &&PointResult| row.place_m[0],
+        )
         .in_gis(),
-        column("y_m", Unit::Metre, "north coordinate on the map, metres", |row: &&PointResult| {
-            row.place_m[1]
-        })
+        column(
+            "y_m",
+            Unit::Metre,
+            "north coordinate on the map, metres",
+            |row: &&PointResult| row.place_m[1],
+        )
         .in_gis(),
         column(
             "sigma_m",
