@@ -30,7 +30,7 @@ use crate::{
 };
 
 /// Raised when the layout of products changes.
-const METHOD: u32 = 30;
+const METHOD: u32 = 31;
 
 /// The products of a site.
 pub(super) struct SitePublication<'a> {

@@ -354,7 +354,7 @@ const DAMAGES: [Damage; 16] = [
     (
         "more lines than tables",
         |isd| isd["image_lines"] = json!(60_000),
-        "expected epochs over the whole image, which is exposed from ",
+        "expected epochs that cover the whole image, which was exposed from ET ",
     ),
 ];
 
@@ -543,7 +543,7 @@ fn what_is_wrong_with_real_support_data_is_said() {
         // The second row of line times lies 98 s behind the middle of the image, not before it.
         (
             "ale_mex/isds/mexhrsc_isd.json",
-            "expected epochs over the whole image",
+            "expected epochs that cover the whole image",
         ),
         // The pixel pitch stands where coefficients should.
         ("ale_mgs/isds/mgsmocna_isd.json", "optical_distortion"),

@@ -214,8 +214,8 @@ declare_table! {
         local: bool = key(yes_or_no("seams remain unchanged", "pictures of a brick adapt to neighbouring bricks")).or(false),
         /// Number of pictures in a brick, if the table of pictures names no bricks.
         brick_pictures: u32 = key(whole_from_to(2, 100)).or(8),
-        /// Treatment of blunders: measurements whose standardised deviation in the adjustment of the whole net exceeds
-        /// the largest value expected by chance in one of a hundred nets.
+        /// Treatment of blunders: measurements whose standardised deviation in the adjustment of the whole net exceeds a
+        /// limit. By chance, the largest deviation exceeds this limit in one of a hundred nets.
         blunders: Blunders = key(words([
             ("remove", Blunders::Remove, "rejected and reported"),
             ("report", Blunders::Report, "flagged and used"),

@@ -195,7 +195,7 @@ struct AdjustmentDocument<'a> {
     boresight: Option<BoresightDocument<'a>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     no_boresight_because: Option<&'a str>,
-    /// With its standard deviation.
+    /// Offset of the attitude clock, seconds, with its standard deviation.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(transform = at("/prefixItems/1", "minimum", 0))]
     attitude_clock_s: Option<(f64, f64)>,
@@ -226,7 +226,7 @@ struct ImageDocument<'a> {
     /// Standard deviation of the delay of all lines, as contained in `sigmas`; 0 if `sigmas` contain no delay.
     #[schemars(range(min = 0.0))]
     line_time_sigma_s: f64,
-    /// With its standard deviation.
+    /// Time bias of the image, seconds, with its standard deviation.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(transform = at("/prefixItems/1", "minimum", 0))]
     time_bias_s: Option<(f64, f64)>,

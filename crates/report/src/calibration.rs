@@ -299,7 +299,7 @@ fn cameras(of: &Calibration) -> Markup {
 fn validation(of: &Calibration) -> Markup {
     if of.validation.is_empty() {
         return paragraph(
-            "No other orbit was given ([[validation]]). An error common to all laser points is not tested.",
+            "No other orbit was given ([[validation]]). An error common to all laser points is not detected.",
         );
     }
     let mut table = Table::new(
@@ -346,7 +346,8 @@ fn offsets(of: &Calibration) -> Markup {
             table.row(true, cells);
         }
     }
-    let words = "The σ of the mean contains measurement and laser errors. The limit allows for constant orbit errors. An \
-                 error common to the laser points of all orbits, such as a different reference sphere, is not tested.";
+    let words = "The σ of the mean contains measurement and laser errors. The limit allows for constant orbit errors. This \
+                 comparison does not detect an error common to the laser points of all orbits, for example from a different \
+                 reference sphere.";
     html! { (table.finish()) p { (words) } }
 }

@@ -1,7 +1,7 @@
-//! The table of the first screen: every limit of the site with the value that uses most of it, the worst first.
+//! The checks of the first screen: every limit of the site with the value that uses most of it, the worst first.
 
 use super::{
-    html::{Cell, Column, Markup, Table, counted, folded, html, link, list},
+    html::{Cell, Column, Markup, Table, counted, folded, folded_unless, html, link, list},
     numbers::{number, signed, whole},
     outcome::marked,
     section::Section,
@@ -20,14 +20,19 @@ pub(super) fn of_site(site: &SiteProducts, sections: &[&Section]) -> Markup {
         _ => format!("{} pass", counted(passed.len(), "other check")),
     };
     html! {
-        @if !others.is_empty() { (table(site, sections, &others)) }
-        @if !passed.is_empty() { (folded(&title, &table(site, sections, &passed))) }
+        @if !others.is_empty() { (table(site, sections, "Checks", &others)) }
+        @if !passed.is_empty() { (folded(&title, &table(site, sections, "Checks that pass", &passed))) }
     }
 }
 
-/// The table of some checks of a site by their index.
-fn table(site: &SiteProducts, sections: &[&Section], checks: &[(usize, &Check)]) -> Markup {
-    let mut table = empty();
+/// A table of some checks of a site with their indices.
+fn table(
+    site: &SiteProducts,
+    sections: &[&Section],
+    caption: &str,
+    checks: &[(usize, &Check)],
+) -> Markup {
+    let mut table = empty(caption);
     for (index, check) in checks {
         let mut all = sections.iter();
         let more = all.find(|section| section.checks.contains(&check.kind));
@@ -43,16 +48,16 @@ fn table(site: &SiteProducts, sections: &[&Section], checks: &[(usize, &Check)])
 
 /// The table of the checks of a net, a calibration or a match.
 pub(super) fn listed(checks: &[Check]) -> Markup {
-    let mut table = empty();
+    let mut table = empty("Checks");
     for check in checks {
         row(&mut table, check, &html! { (check.words()) }, "");
     }
     table.finish()
 }
 
-fn empty() -> Table {
+fn empty(caption: &str) -> Table {
     Table::new(
-        "Checks",
+        caption,
         &[
             Column::Text("result"),
             Column::Text("check"),
@@ -143,8 +148,8 @@ pub(super) fn limit(check: &Check) -> String {
 
 /// Errors that no datum can show.
 pub(super) fn untested(phrases: &[String]) -> Markup {
-    let title = format!("{NOT_TESTED} {}", counted(phrases.len(), "kind of error"));
-    html! { (folded(&title.replace("kind of errors", "kinds of error"), &list(phrases))) }
+    // A verdict is read together with its reservations.
+    folded_unless(true, NOT_TESTED, &list(phrases))
 }
 
 #[cfg(test)]

@@ -78,7 +78,7 @@ impl Section {
         }
     }
 
-    /// The section folded under its heading and a note, unless it `is_open`.
+    /// The section, to be folded under its heading and a note; `is_open` from the start or not.
     pub(super) fn folded(mut self, note: Markup, is_open: bool) -> Self {
         self.fold = Some(Fold { note, is_open });
         self

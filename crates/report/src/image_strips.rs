@@ -1,12 +1,13 @@
-//! Images with the footprints in them, and the ground below: the figure that shows what a registration is.
+//! Images with their footprints before and after the adjustment, and the elevation profile of the footprints.
 //!
-//! Figure 1 of Shan et al. 2002 draws the profile of the altimeter on the image.
+//! Figure 1 of Shan et al. 2002 shows the profile of the altimeter on the image.
+
+use std::cmp::Reverse;
 
 use super::{
-    html::{Markup, html},
+    html::{Markup, counted, html},
     map::relief,
-    numbers::whole,
-    plots::{Extent, Panel, PanelPicture, Plot, Series, figure, label, thinned},
+    plots::{Extent, Panel, PanelPicture, Plot, Series, figure, thinned},
 };
 use areograph_base::error::Result;
 use areograph_products::{SiteProducts, error::ProductError};
@@ -45,10 +46,13 @@ struct Strip<'a> {
     after: Option<Shown>,
 }
 
-/// Footprints in an image: lines, samples, and heights above the areoid.
+/// Footprints in an image, thinned for the drawing.
 struct Shown {
+    /// Line and sample, 0 at the outer edge of the first one.
     places: Vec<(f64, f64)>,
+    /// Line, and height above the areoid, metres.
     heights_m: Vec<(f64, f64)>,
+    /// Number of all of them.
     count: usize,
 }
 
@@ -61,7 +65,7 @@ fn strips<'a>(site: &SiteProducts<'a>) -> Vec<Strip<'a>> {
         .into_iter()
         .filter_map(|image| strip(site, overlays, image))
         .collect();
-    strips.sort_by_key(|strip| usize::MAX - strip.latest().count);
+    strips.sort_by_key(|strip| Reverse(strip.latest().count));
     strips.truncate(IMAGES);
     strips
 }
@@ -109,17 +113,16 @@ impl Strip<'_> {
         let look = self.look.within(PIXELS);
         let reduction = f64::from(look.reduction);
         let [lines, samples] = [look.height, look.width].map(|count| f64::from(count) * reduction);
-        let series = |of: fn(&Shown) -> &Vec<(f64, f64)>| {
-            let before = Series::dots(
-                "orientation from the kernels",
-                BEFORE,
-                of(&self.before).clone(),
-            );
-            let after = self
-                .after
-                .as_ref()
-                .map(|after| Series::dots("adjusted orientation", AFTER, of(after).clone()));
-            [before].into_iter().chain(after).collect::<Vec<_>>()
+        let states = [
+            ("orientation from the kernels", BEFORE, Some(&self.before)),
+            ("adjusted orientation", AFTER, self.after.as_ref()),
+        ];
+        let series = |of: fn(&Shown) -> &Vec<(f64, f64)>| -> Vec<Series> {
+            let each = states.iter().filter_map(|(name, colour, shown)| {
+                let points = of((*shown)?).clone();
+                Some(Series::dots(name, *colour, points))
+            });
+            each.collect()
         };
         let [along, across] = [lines, samples].map(|high| Extent { low: 0.0, high });
         let picture = Panel {
@@ -130,25 +133,30 @@ impl Strip<'_> {
                 x: along,
                 y: across,
             }),
-            // Without footprints the picture is drawn all the same.
-            limits: if self.latest().count == 0 {
-                vec![0.0, samples]
-            } else {
-                Vec::new()
-            },
             ..Panel::of("sample", series(|of| &of.places))
+        };
+        // A panel has names that are known when the program is built.
+        let above = if terms.has_areoid {
+            "above the areoid, m"
+        } else {
+            "above the ellipsoid, m"
         };
         let ground = Panel {
             height: 240,
-            ..Panel::of("above the areoid, m", series(|of| &of.heights_m))
+            ..Panel::of(above, series(|of| &of.heights_m))
+        };
+        let count = self.latest().count;
+        let thinned = match count.div_ceil(DOTS) {
+            0 | 1 => String::new(),
+            step => format!(", 1 in {step} drawn"),
         };
         let words = format!(
-            "{id} with the {} footprints that it shows, and their heights by {}. Flight to the right, not to scale across the track; one pixel \
-             of the picture is {} × {} pixels of the image.",
-            whole(self.latest().count),
+            "{id} with {}{thinned}, and heights from {}. Flight to the right; not to scale across the track. One pixel of the \
+             picture is {} × {} pixels of the image.",
+            counted(count, "footprint"),
             terms.altimeter,
-            label(reduction, 0),
-            label(reduction, 0),
+            look.reduction,
+            look.reduction,
         );
         figure(&Plot {
             x: Extent::of([0.0, lines].into_iter()),

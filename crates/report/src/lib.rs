@@ -82,7 +82,7 @@ pub use net::net_page;
 pub use overlays::overlays_page;
 pub use section::Section;
 pub use sites::{Earlier, SiteLine, SiteSummary, sites_page};
-pub use summary::DOWNLOADS;
+pub use summary::{DOWNLOADS, UNADJUSTED};
 pub use terrain_pictures::terrain_pictures;
 
 /// Parts of sections that are declared outside this crate.

@@ -25,7 +25,7 @@ use super::{
     graticule::{View, graticule},
     html::{Markup, counted, html},
     many,
-    plots::{COLOURS, Canvas, Drawn, GRID, INK, WIDTH, drawn, figure_html, thinned},
+    plots::{COLOURS, Canvas, Drawn, GRID, INK, WIDTH, drawn, figure_html, place_behind, thinned},
     section::Section,
 };
 use areograph_base::error::Result;
@@ -97,9 +97,9 @@ fn figure(site: &SiteProducts, shown: Shown, only: bool) -> Result<Markup> {
     let sheet = Sheet::of(site, shown);
     let relief = sheet.relief(site);
     let mut svg = drawn((sheet.height() + STRIP) as u32, |area| sheet.draw(area))?;
-    if let (Some(relief), Some(start)) = (&relief, svg.find('>')) {
+    if let Some(relief) = &relief {
         let (width, height) = (f64::from(WIDTH), f64::from(sheet.height()));
-        svg.insert_str(start + 1, &relief.svg(sheet.heights_m, width, height)?);
+        place_behind(&mut svg, &relief.svg(sheet.heights_m, width, height)?);
     }
     let mut title = "Windows, footprints and images".to_owned();
     if !only {

@@ -11,7 +11,7 @@ use areograph_products::SiteProducts;
 /// by its capability, and order and contents of the page follow.
 #[derive(Debug, Clone, Copy)]
 pub struct Section {
-    /// Its heading, and its name in the list of contents.
+    /// Its heading.
     pub title: &'static str,
     /// Its name in links, unique on the page.
     pub anchor: &'static str,
@@ -24,7 +24,7 @@ pub struct Section {
 }
 
 impl Section {
-    /// The section of this site, if it has one.
+    /// The section of this site, if it has one: folded under its heading unless one of its checks fails or warns.
     ///
     /// # Errors
     /// A plot that cannot be drawn, which is a bug in areograph.

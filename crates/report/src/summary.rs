@@ -1,4 +1,4 @@
-//! The first screen of a site's page: verdict, key numbers, every check, the map.
+//! The first screen of a site's page: verdict, key numbers, images with footprints, checks, downloads, the map.
 
 use std::borrow::Cow;
 
@@ -92,7 +92,8 @@ fn about(site: &SiteProducts) -> Markup {
 }
 
 /// Names of the products that most users take: paths, and file names of products of images.
-pub const DOWNLOADS: [&str; 7] = [
+pub const DOWNLOADS: [&str; 8] = [
+    "footprints.parquet",
     "registered_footprints.parquet",
     "registered_footprints.csv",
     "exchange/registered_footprints.gpkg",
@@ -101,15 +102,18 @@ pub const DOWNLOADS: [&str; 7] = [
     "orthoimage.tif",
     "adjusted_isd.json",
 ];
+/// Offered in place of the last one if there is no adjustment.
+pub const UNADJUSTED: &str = "isd.json";
 
 /// Links to these products.
 fn downloads(site: &SiteProducts) -> Markup {
-    let shown = site.shown_images();
+    let (shown, is_adjusted) = (site.shown_images(), site.adjustment().is_some());
     let is_offered = |of: &&Listed| match of.image {
         None => DOWNLOADS.contains(&&*of.path),
         Some(image) => {
             let name = of.path.rsplit('/').next().unwrap_or_default();
-            DOWNLOADS.contains(&name) && shown.binary_search(&image).is_ok()
+            let is_named = DOWNLOADS.contains(&name) || !is_adjusted && name == UNADJUSTED;
+            is_named && shown.binary_search(&image).is_ok()
         }
     };
     let offered: Vec<&Listed> = site.listed.iter().filter(is_offered).collect();

@@ -2,7 +2,6 @@
 
 use std::fmt::Write as _;
 
-use base64::{Engine as _, engine::general_purpose::STANDARD};
 use plotters::prelude::*;
 
 use super::{
@@ -11,7 +10,7 @@ use super::{
         keys::{ColourBar, draw_scale},
         relief, round_length_m,
     },
-    plots::{Canvas, Drawn, INK, WIDTH, drawn, figure_html, label, thinned},
+    plots::{Canvas, Drawn, INK, WIDTH, drawn, figure_html, image, label, place_behind, thinned},
 };
 use areograph_base::{error::Result, terms::Terms, units::RADIANS_PER_DEGREE};
 use areograph_products::error::ProductError;
@@ -223,17 +222,10 @@ impl<'a> Frame<'a> {
             self.draw_scale(area)?;
             bar.draw(self.height as i32, area)
         })?;
-        if let Some(start) = svg.find('>') {
-            let image = format!(
-                "<image x=\"{:.0}\" y=\"0\" width=\"{:.0}\" height=\"{:.0}\" preserveAspectRatio=\"none\" \
-                 href=\"data:image/png;base64,{}\"/>\n",
-                self.left,
-                self.width,
-                self.height,
-                STANDARD.encode(png)
-            );
-            svg.insert_str(start + 1, &image);
-        }
+        place_behind(
+            &mut svg,
+            &image([self.left, 0.0, self.width, self.height], &png),
+        );
         Ok(figure_html(title, &svg, &[], caption, &csv(bar, shots)))
     }
 

@@ -311,8 +311,8 @@ impl Truth {
                 rule: "in the files, ground and spacecraft are too high by the residual, amplitude_m sin(2 pi et / period_s) at \
                 the mid-point of the frame; radii are the values before its subtraction",
             },
-            frame_model: "A PEDR frame is linear in latitude and longitude. Near the poles, during slews and on steep ground \
-                off nadir, it cannot represent 20 true footprints to 0.2 m; it does not include jitter. The numbers of \
+            frame_model: "Latitude and longitude vary linearly within a PEDR frame. Near the poles, during slews and on steep ground \
+                off nadir, a frame cannot represent 20 true footprints to 0.2 m; it does not include jitter. The numbers of \
                 affected shots are under files, the largest errors under profiles.",
             images: Vec::new(),
             files: Vec::new(),

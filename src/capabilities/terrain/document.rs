@@ -18,8 +18,8 @@ const DEFINITIONS: [(&str, &str); 7] = [
         "cells",
         "common: cells that both images show according to their orientation; filled: cells with a height; unfilled: cells \
          without a height, by reason: flat (no texture), missing (lines or pixels), edge (of an image), unlike (no correlation), \
-         ambiguous (two heights correlate), unsettled, one_way (different heights with the other image as the template), \
-         uncertain, alone (contradicted by surrounding cells)",
+         ambiguous (two heights correlate), unsettled (no convergence), one_way (different heights with the other image as \
+         the template), uncertain (standard deviation too large), alone (contradicted by surrounding cells)",
     ),
     (
         "sigma_m",

@@ -22,6 +22,7 @@ use super::{
         case::Case,
         json,
         mission::{mission, succeed},
+        page::csv,
     },
     misregistration::{TRANSFORMED_M, true_camera, true_footprints_m},
     table, vector,
@@ -296,6 +297,97 @@ fn drawn_footprints_lie_on_the_same_true_ground_in_both_images_after_the_adjustm
     }
     ties_of_the_page(&truth, &pieces, ids);
     strips(&folder, ids, &places);
+    let page = fs::read_to_string(folder.join("report/index.html")).unwrap();
+    let painted =
+        shown_footprints(&fs::read_to_string(folder.join("report/overlays.html")).unwrap());
+    for (id, places) in ids.iter().zip(&places) {
+        let craters: Vec<[f64; 2]> = painted.iter().map(|(_, row)| places[row]).collect();
+        picture_on_the_axes(&page, id, &craters);
+    }
+}
+
+/// On the first screen, craters of the image lie at their true lines and samples, by the axes on which footprints are drawn.
+fn picture_on_the_axes(page: &str, id: &str, craters: &[[f64; 2]]) {
+    let name = format!("{}-with-its-footprints", id.to_lowercase());
+    let figure = page
+        .split(&format!("<figure id=\"{name}\""))
+        .nth(1)
+        .unwrap();
+    let svg = figure.split("</svg>").next().unwrap();
+    let number = |element: &str, key: &str| -> f64 {
+        let value = element.split(&format!(" {key}=\"")).nth(1).unwrap();
+        value.split('"').next().unwrap().parse().unwrap()
+    };
+    // The first panel is the image: its dots come first, in the order of the data.
+    let drawn = csv(page, &name).into_iter().skip(1);
+    let drawn: Vec<[f64; 2]> = drawn
+        .take_while(|row| row[0] == "sample")
+        .map(|row| [row[2].parse().unwrap(), row[3].parse().unwrap()])
+        .collect();
+    let dots = svg.split("<circle").skip(1).take(drawn.len());
+    let dots: Vec<[f64; 2]> = dots
+        .map(|dot| [number(dot, "cx"), number(dot, "cy")])
+        .collect();
+    assert!(drawn.len() > 100, "{id}: {} dots", drawn.len());
+    let scale = |axis: usize| {
+        let by = |one: &usize, other: &usize| drawn[*one][axis].total_cmp(&drawn[*other][axis]);
+        let [low, high] = [
+            (0..drawn.len()).min_by(by).unwrap(),
+            (0..drawn.len()).max_by(by).unwrap(),
+        ];
+        let factor = (dots[high][axis] - dots[low][axis]) / (drawn[high][axis] - drawn[low][axis]);
+        (dots[low][axis] - factor * drawn[low][axis], factor)
+    };
+    let axes = [scale(0), scale(1)];
+    let image = svg.split("<image").nth(1).unwrap();
+    let data = image
+        .split("base64,")
+        .nth(1)
+        .unwrap()
+        .split('"')
+        .next()
+        .unwrap();
+    let mut decoder = png::Decoder::new(std::io::Cursor::new(STANDARD.decode(data).unwrap()))
+        .read_info()
+        .unwrap();
+    let mut pixels = vec![0; decoder.output_buffer_size().unwrap()];
+    let frame = decoder.next_frame(&mut pixels).unwrap();
+    let [width, height] = [frame.width, frame.height].map(|count| count as usize);
+    let grey = |line: f64, sample: f64| {
+        let [x, y] =
+            [(axes[0], line), (axes[1], sample)].map(|((zero, factor), at)| zero + factor * at);
+        let column = (x - number(image, "x")) / number(image, "width") * width as f64;
+        let row = (y - number(image, "y")) / number(image, "height") * height as f64;
+        let is_inside =
+            (0.0..width as f64).contains(&column) && (0.0..height as f64).contains(&row);
+        is_inside.then(|| f64::from(pixels[4 * (row as usize * width + column as usize)]))
+    };
+    let mean = |line_off: f64, sample_off: f64| {
+        let greys = craters
+            .iter()
+            .filter_map(|[line, sample]| grey(line + line_off, sample + sample_off));
+        let greys: Vec<f64> = greys.collect();
+        assert!(greys.len() >= 3, "{id}: {} craters", greys.len());
+        greys.iter().sum::<f64>() / greys.len() as f64
+    };
+    let at_craters = mean(0.0, 0.0);
+    println!(
+        "{id}: {at_craters:.0} at craters, {:.0} and {:.0} beside them",
+        mean(60.0, 0.0),
+        mean(0.0, 100.0)
+    );
+    // A crater of 20 pixels covers two pixels of the picture; dots are drawn to a unit, ten lines or six samples.
+    for beside in [
+        mean(60.0, 0.0),
+        mean(-60.0, 0.0),
+        mean(0.0, 100.0),
+        mean(0.0, -100.0),
+    ] {
+        assert!(
+            at_craters > beside + 120.0,
+            "{id}: {at_craters} at craters, {beside} beside them"
+        );
+    }
 }
 
 /// A tie point that truth calls a blunder is measured beside its crater in the image that truth names, and on it in the other.

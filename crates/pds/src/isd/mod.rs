@@ -295,7 +295,7 @@ impl SupportTables {
             let held = Interval::new(first, last).padded(times.mean_period_s());
             if !(held.contains(exposed.start) && held.contains(exposed.stop)) {
                 let expected = format!(
-                    "epochs over the whole image, which is exposed from {} to {}",
+                    "epochs that cover the whole image, which was exposed from ET {} s to {} s",
                     exposed.start.seconds(),
                     exposed.stop.seconds()
                 );

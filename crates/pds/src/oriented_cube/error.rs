@@ -52,7 +52,7 @@ pub(super) enum CubeError {
         part_s: f64,
     },
     #[error(
-        "table {table} of the cube has epochs from {first_s} to {last_s}; expected epochs over the whole image, which is exposed from {start_s} to {stop_s}"
+        "table {table} of the cube has epochs from {first_s} to {last_s}; expected epochs that cover the whole image, which was exposed from ET {start_s} s to {stop_s} s"
     )]
     Reach {
         table: &'static str,

@@ -87,7 +87,7 @@ pub(super) struct Radii {
     pub(super) unit: &'static str,
 }
 
-/// Millimetres.
+/// Focal length, millimetres.
 #[derive(Serialize, JsonSchema)]
 pub(super) struct FocalLength {
     pub(super) focal_length: f64,
@@ -105,7 +105,7 @@ pub(super) struct OpticalDistortion {
     pub(super) radial: Radial,
 }
 
-/// Coefficients of r, r³ and r⁵ in millimetres.
+/// Coefficients of r, r³ and r⁵, with r in millimetres.
 #[derive(Serialize, JsonSchema)]
 pub(super) struct Radial {
     pub(super) coefficients: [f64; 3],

@@ -16,7 +16,7 @@ use areograph_products::read::{FootprintRows, read_footprints};
 /// Footprints of both runs, matched by file, orbit, record and shot.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct FootprintsDifference {
-    /// Number of footprints in both runs.
+    /// Number of footprints common to both runs.
     pub matched: usize,
     /// Number of footprints only in the first run.
     pub only_in_a: usize,

@@ -2,9 +2,7 @@
 //!
 //! A picture for display, not for measurement: heights are tested against a kriged surface ([`areograph_geom::surface`]).
 
-use base64::{Engine as _, engine::general_purpose::STANDARD};
-
-use super::super::graticule::View;
+use super::super::{graticule::View, plots::image};
 use areograph_base::error::Result;
 use areograph_products::error::ProductError;
 
@@ -254,11 +252,7 @@ impl Relief {
             self.surface.rows as u32,
         )
         .map_err(ProductError::refused("draw a map"))?;
-        Ok(format!(
-            "<image x=\"0\" y=\"0\" width=\"{width}\" height=\"{height}\" preserveAspectRatio=\"none\" \
-             href=\"data:image/png;base64,{}\"/>\n",
-            STANDARD.encode(png)
-        ))
+        Ok(image([0.0, 0.0, width, height], &png))
     }
 }
 

@@ -1,5 +1,6 @@
 //! The drawing library's canvas, and words and numbers on it.
 
+use base64::{Engine as _, engine::general_purpose::STANDARD};
 use plotters::{
     coord::{Shift, types::RangedCoordf64},
     prelude::*,
@@ -34,6 +35,22 @@ pub(crate) fn drawn(
             .map_err(ProductError::refused("draw a plot"))?;
     }
     Ok(svg)
+}
+
+/// A picture as an element of an SVG: left, top, width and height in units of the drawing.
+pub(crate) fn image([left, top, width, height]: [f64; 4], png: &[u8]) -> String {
+    format!(
+        "<image x=\"{left:.1}\" y=\"{top:.1}\" width=\"{width:.1}\" height=\"{height:.1}\" preserveAspectRatio=\"none\" \
+         href=\"data:image/png;base64,{}\"/>\n",
+        STANDARD.encode(png)
+    )
+}
+
+/// Places elements behind everything else that an SVG draws.
+pub(crate) fn place_behind(svg: &mut String, elements: &str) {
+    if let Some(start) = svg.find('>') {
+        svg.insert_str(start + 1, elements);
+    }
 }
 
 /// Words on a drawing, in the colour of ink.

@@ -1,12 +1,11 @@
 //! Plots on paper: panels with their axes, marks, series, arrows and bars.
 
-use base64::{Engine as _, engine::general_purpose::STANDARD};
 use plotters::prelude::*;
 
 use super::{
     Frame, GRID, INK, LETTERS, MARK, Panel, PanelPicture, Plot, Series, Style, WIDTH,
     arrows::draw_arrows,
-    canvas::{Canvas, Chart, Drawn, label},
+    canvas::{Canvas, Chart, Drawn, image, label},
 };
 
 /// Height of the axis below the lowest panel, with its labels.
@@ -26,43 +25,27 @@ const DECIMALS_MANY: usize = 5;
 /// Number of bars over the range of a panel.
 const BAR_COUNT: usize = 24;
 
-pub(super) fn plot<'a>(plot: &Plot, area: &Canvas<'a>) -> Drawn<'a> {
+/// Draws a plot; pictures of its panels are appended to `pictures`, as the drawing library places them.
+pub(super) fn plot<'a>(plot: &Plot, area: &Canvas<'a>, pictures: &mut String) -> Drawn<'a> {
     let last = plot.drawn().count().saturating_sub(1);
     let mut rest = area.clone();
     for (place, panel) in plot.drawn().enumerate() {
         let lowest = place == last;
         let height = panel.height + if lowest { FOOT } else { 0 };
         let (own, below) = rest.split_vertically(height);
-        draw_panel(plot, panel, lowest, &own)?;
+        draw_panel(plot, panel, lowest, &own, pictures)?;
         rest = below;
     }
     Ok(())
 }
 
-/// The pictures of panels as images of the SVG, to which axes and series are added.
-pub(super) fn pictures(plot: &Plot) -> String {
-    let mut images = String::new();
-    let mut top = MARGIN;
-    for panel in plot.drawn() {
-        if let Some(PanelPicture { png, x, y }) = &panel.picture {
-            let across = f64::from(WIDTH - SIDE - MARGIN) / (plot.x.high - plot.x.low);
-            let down = f64::from(panel.height - MARGIN - GUTTER) / (panel.y.high - panel.y.low);
-            images += &format!(
-                "<image x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{:.1}\" preserveAspectRatio=\"none\" \
-                 href=\"data:image/png;base64,{}\"/>\n",
-                f64::from(SIDE) + (x.low - plot.x.low) * across,
-                f64::from(top) + (panel.y.high - y.high) * down,
-                (x.high - x.low) * across,
-                (y.high - y.low) * down,
-                STANDARD.encode(png)
-            );
-        }
-        top += panel.height;
-    }
-    images
-}
-
-fn draw_panel<'a>(plot: &Plot, panel: &Panel, lowest: bool, area: &Canvas<'a>) -> Drawn<'a> {
+fn draw_panel<'a>(
+    plot: &Plot,
+    panel: &Panel,
+    lowest: bool,
+    area: &Canvas<'a>,
+    pictures: &mut String,
+) -> Drawn<'a> {
     let foot = if lowest { FOOT } else { 0 };
     let histograms = plot.drawn().any(|panel| panel.histogram);
     let width = if histograms { WIDTH - BARS } else { WIDTH };
@@ -101,6 +84,14 @@ fn draw_panel<'a>(plot: &Plot, panel: &Panel, lowest: bool, area: &Canvas<'a>) -
             }
         })
         .draw()?;
+    if let Some(PanelPicture { png, x, y }) = &panel.picture {
+        let corner = |x: f64, y: f64| {
+            let (column, row) = chart.backend_coord(&(x, y));
+            [column, row].map(f64::from)
+        };
+        let ([left, top], [right, bottom]) = (corner(x.low, y.high), corner(x.high, y.low));
+        *pictures += &image([left, top, right - left, bottom - top], png);
+    }
     draw_marks(plot, panel, &mut chart)?;
     for series in &panel.series {
         draw_series(&plot.frame(panel), series, &mut chart)?;

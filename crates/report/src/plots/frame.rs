@@ -106,7 +106,11 @@ impl Panel {
     /// Reason why there is nothing to draw.
     fn idle(&self) -> Option<String> {
         let mut values = self.series.iter().flat_map(|series| &series.points);
-        if self.log || !self.arrows.is_empty() || self.limits.iter().any(|at| self.y.contains(*at))
+        let has_picture = self.picture.is_some();
+        if self.log
+            || has_picture
+            || !self.arrows.is_empty()
+            || self.limits.iter().any(|at| self.y.contains(*at))
         {
             return None;
         }

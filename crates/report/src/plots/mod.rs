@@ -11,7 +11,7 @@ mod palette;
 
 pub(super) use arrows::{Arrow, Arrows, magnification};
 pub use canvas::label;
-pub(super) use canvas::{Canvas, Drawn, draw_text, drawn};
+pub(super) use canvas::{Canvas, Drawn, draw_text, drawn, image, place_behind};
 pub(super) use figure::{Key, figure_html, with_files};
 pub(super) use frame::Frame;
 pub(super) use palette::{COLOURS, GREY, GRID, INK, MARK, SOFT};
@@ -114,7 +114,7 @@ pub(super) struct Panel {
     pub(super) picture: Option<PanelPicture>,
 }
 
-/// A picture in the units of the axes of a panel.
+/// A picture and the ranges of the axes of a panel that it covers, from its outer edges.
 #[derive(Debug)]
 pub(super) struct PanelPicture {
     pub(super) png: Vec<u8>,
@@ -244,10 +244,9 @@ pub(super) fn figure(plot: &Plot) -> Result<Markup> {
         return Ok(html! { p { (plot.title) ": " (plot.description()) } });
     }
     let height = plot.drawn().map(|panel| panel.height).sum::<u32>() + draw::FOOT;
-    let mut svg = drawn(height, |area| draw::plot(plot, area))?;
-    if let Some(start) = svg.find('>') {
-        svg.insert_str(start + 1, &draw::pictures(plot));
-    }
+    let mut pictures = String::new();
+    let mut svg = drawn(height, |area| draw::plot(plot, area, &mut pictures))?;
+    place_behind(&mut svg, &pictures);
     Ok(figure_html(
         &plot.title,
         &svg,
@@ -337,6 +336,59 @@ pub(super) fn thinned<T: Copy>(points: &[T], limit: usize) -> Vec<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_picture_lies_on_the_axes_of_its_panel() {
+        let corners = vec![(10.0, 2.0), (90.0, 7.0)];
+        let picture = || PanelPicture {
+            png: Vec::new(),
+            x: Extent {
+                low: 10.0,
+                high: 90.0,
+            },
+            y: Extent {
+                low: 2.0,
+                high: 7.0,
+            },
+        };
+        let panel = |histogram| Panel {
+            picture: Some(picture()),
+            histogram,
+            ..Panel::of("y", vec![Series::dots("corners", 0, corners.clone())])
+        };
+        // The lowest panel has the axis, and a histogram takes room at the side.
+        for histogram in [false, true] {
+            let panels = vec![panel(false), panel(histogram)];
+            let plot = Plot::of("t".to_owned(), String::new(), "x", panels);
+            let svg = figure(&plot).unwrap().0;
+            let numbers = |element: &str, keys: &[&str]| -> Vec<f64> {
+                let value = |key: &&str| element.split(&format!(" {key}=\"")).nth(1).unwrap();
+                let number = |key| value(key).split('"').next().unwrap().parse().unwrap();
+                keys.iter().map(number).collect()
+            };
+            let images = svg.split("<image").skip(1);
+            let images: Vec<_> = images
+                .map(|of| numbers(of, &["x", "y", "width", "height"]))
+                .collect();
+            let dots = svg.split("<circle").skip(1);
+            let dots: Vec<_> = dots.map(|of| numbers(of, &["cx", "cy"])).collect();
+            assert_eq!((images.len(), dots.len()), (2, 4));
+            for (image, dots) in images.iter().zip(dots.chunks(2)) {
+                let [left, top, width, height] = image[..] else {
+                    panic!("{image:?}");
+                };
+                assert_eq!(dots[0], [left, top + height]);
+                assert_eq!(dots[1], [left + width, top]);
+            }
+        }
+        // A picture is drawn without any dot.
+        let empty = Panel {
+            picture: Some(picture()),
+            ..Panel::of("y", Vec::new())
+        };
+        let plot = Plot::of("t".to_owned(), String::new(), "x", vec![empty]);
+        assert!(figure(&plot).unwrap().0.contains("<image"));
+    }
 
     #[test]
     fn thinning_keeps_the_limit_and_the_first() {

@@ -38,8 +38,8 @@ pub struct HeightSummary {
     /// Statistics of adjusted heights above the surface, metres.
     pub above_m: Summary,
     /// Number of tie points that are compared with the surface; `beyond_limit` of these points are farther from the
-    /// surface than 3.29 of their own standard deviations: a few are craters between the profiles, more are measurement
-    /// errors across the track.
+    /// surface than 3.29 of their own standard deviations. A few of these may lie in craters between the profiles; a
+    /// larger number indicates measurement errors across the track.
     pub compared: usize,
     /// Number of compared tie points that are farther from the surface than 3.29 of their own standard deviations.
     pub beyond_limit: usize,

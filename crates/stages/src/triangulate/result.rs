@@ -153,7 +153,7 @@ pub struct BrickResult {
     pub flagged: u32,
     /// Measurements that were rejected.
     pub removed: u32,
-    /// Shrinkage that the two approximate points of a brick cause, before its reversal.
+    /// Shrinkage caused by the two approximate points of a brick, before the shrinkage is removed.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
     pub shrinkage: Option<ShrinkageResult>,
 }
@@ -179,7 +179,7 @@ pub struct Seams {
     /// Root mean square of δX and δY after LOCAL, metres; absent if LOCAL did not run.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
     pub local_rms_m: Option<[f64; 2]>,
-    /// Shrinkage that the two controls of EXTEND cause, before its reversal.
+    /// Shrinkage caused by the two controls of EXTEND, before the shrinkage is removed.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
     pub shrinkage: Option<ShrinkageResult>,
 }
