@@ -371,11 +371,6 @@ fn picture_on_the_axes(page: &str, id: &str, craters: &[[f64; 2]]) {
         greys.iter().sum::<f64>() / greys.len() as f64
     };
     let at_craters = mean(0.0, 0.0);
-    println!(
-        "{id}: {at_craters:.0} at craters, {:.0} and {:.0} beside them",
-        mean(60.0, 0.0),
-        mean(0.0, 100.0)
-    );
     // A crater of 20 pixels covers two pixels of the picture; dots are drawn to a unit, ten lines or six samples.
     for beside in [
         mean(60.0, 0.0),
