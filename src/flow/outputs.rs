@@ -8,6 +8,7 @@ use crate::{
         adjust::Adjusted, check_heights::HeightCheck, compare_pairs::PairComparison,
         convert_datum::Converted, group_profiles::Profile, intersect::IntersectedTies,
         search_footprints::SearchResult, site_image::SiteImage, tag_times::ImageTimes,
+        tag_utc::ShotTimes,
     },
     store::book::Book,
 };
@@ -20,7 +21,7 @@ pub(super) type Shots<'a> = (&'a Output<Converted>, &'a Output<Vec<Profile>>);
 pub(super) struct Prepared {
     pub(super) found: Output<SearchResult>,
     pub(super) converted: Output<Converted>,
-    pub(super) utc: Output<Vec<String>>,
+    pub(super) utc: Output<ShotTimes>,
     pub(super) profiles: Output<Vec<Profile>>,
     /// Line times, in the order of the configuration.
     pub(super) images: Vec<Output<ImageTimes>>,

@@ -31,7 +31,7 @@ use crate::{
         check_profiles::CheckProfiles,
         check_ranges::{CheckRanges, CheckTableRanges},
         compare_pairs::ComparePairs,
-        convert_datum::ConvertDatum,
+        convert_datum::{ConvertDatum, FoundShots},
         describe_kernels::{DescribeKernels, Required},
         fit_sensor_model::FitSensorModel,
         group_profiles::GroupProfiles,
@@ -155,12 +155,17 @@ pub(super) fn prepare<D: SiteDriver>(flow: &mut D, config: &SiteConfig) -> Flow<
         };
         config.images.iter().map(tag).collect::<Flow<Vec<_>>>()?
     };
-    let found = found(flow, config, &images, clocks.as_ref())?;
+    let mut found = found(flow, config, &images, clocks.as_ref())?;
+    let shots = found
+        .take_rows(|found| std::mem::replace(&mut found.footprints, Footprints::new(Vec::new())));
     let converted = flow.stage(&ConvertDatum {
         found: &found,
+        shots: FoundShots::of(shots),
         altimeter_clock: &config.altimeter_clock,
         ground: &config.pedr.crossover,
     })?;
+    // Shots as in their files are no longer needed: a million of them occupy a fifth of a gigabyte.
+    let found = found.without_rows(|found| found.footprints = Footprints::new(Vec::new()));
     let utc = flow.stage(&TagUtc {
         converted: &converted,
         kernels: &KernelView::text(clocks.as_ref()),
@@ -172,8 +177,7 @@ pub(super) fn prepare<D: SiteDriver>(flow: &mut D, config: &SiteConfig) -> Flow<
     })?;
     Ok(Prepared {
         required: flow.required(config, &images, &profiles),
-        // Shots as in their files are no longer needed: a million of them occupy a fifth of a gigabyte.
-        found: found.without_rows(|found| found.footprints = Footprints::new(Vec::new())),
+        found,
         converted,
         utc,
         profiles,

@@ -358,7 +358,7 @@ fn a_control_network_is_read_again_as_it_was_written() {
         id: "gusev",
         body: Body::Mars,
         description: "made for a test".to_owned(),
-        created_utc: "1999-05-06T15:33:58.130",
+        created_utc: "1999-05-06T15:33:58.130".to_owned(),
         points,
     };
     let folder = tempfile::tempdir().unwrap();

@@ -125,7 +125,7 @@ macro_rules! columns {
             pub body: Body,
             /// Which radius represents the ground.
             pub ground: GroundRadius,
-            $($(#[$doc])* pub $column: Vec<$kind>,)*
+            $($(#[$doc])* #[serde(with = "crate::packed")] pub $column: Vec<$kind>,)*
             datum: PhantomData<D>,
         }
 
@@ -245,8 +245,17 @@ impl<D> Footprints<D> {
     #[must_use]
     pub fn topography_m(&self) -> Vec<f64> {
         (0..self.len())
-            .map(|row| self.row(row).topography_m())
+            .map(|row| self.topography_of_m(row))
             .collect()
+    }
+
+    /// Height of the shot in row `row` above the areoid, after the crossover correction, metres.
+    ///
+    /// # Panics
+    /// If the row does not exist.
+    #[must_use]
+    pub fn topography_of_m(&self, row: usize) -> f64 {
+        self.radius_crossover_m[row] - self.areoid_radius_m[row]
     }
 
     /// Radius of the ground by the shot in row `row`, metres: the one that all stages use.

@@ -28,6 +28,7 @@ pub mod kernel_names;
 pub mod kernel_source;
 pub mod line_times;
 pub mod minus;
+pub mod packed;
 #[cfg(feature = "schema")]
 pub mod schema;
 pub mod season;
@@ -37,5 +38,6 @@ pub mod terms;
 pub mod ties;
 pub mod time;
 pub mod units;
+pub mod utc;
 pub mod verdict;
 pub mod watch;

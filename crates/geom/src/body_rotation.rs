@@ -72,9 +72,35 @@ pub fn body_rotation(body: Body, et: Et) -> Rotation<J2000, BodyFixed> {
     Rotation::new(body_matrix(body.model(), et), et)
 }
 
-/// Converts a position from the body-fixed frame of `datum` at `out_at` to the products' frame of `body` at `into_at`.
-///
-/// Both instants are equal unless a clock correction is to rotate the body in between.
+/// Conversion from the body-fixed frame of a datum at an instant to the products' frame of a body.
+#[derive(Debug, Clone)]
+pub struct DatumConversion {
+    /// From J2000 to the frame of the datum.
+    from_j2000: Matrix3<f64>,
+    into: Rotation<J2000, BodyFixed>,
+}
+
+impl DatumConversion {
+    /// From the frame of `datum` at `out_at` to the products' frame of `body` at `into_at`.
+    ///
+    /// Both instants are equal unless a clock correction is to rotate the body in between.
+    #[must_use]
+    pub fn of(body: Body, datum: Datum, out_at: Et, into_at: Et) -> Self {
+        Self {
+            from_j2000: body_matrix(datum.model(), out_at),
+            into: body_rotation(body, into_at),
+        }
+    }
+
+    /// The position in the products' frame.
+    #[must_use]
+    pub fn apply(&self, xyz_m: &Vector3<f64>) -> Position<BodyFixed> {
+        self.into
+            .apply(&Position::new(self.from_j2000.tr_mul(xyz_m)))
+    }
+}
+
+/// Converts one position by [`DatumConversion`].
 #[must_use]
 pub fn convert_datum(
     body: Body,
@@ -83,6 +109,5 @@ pub fn convert_datum(
     out_at: Et,
     into_at: Et,
 ) -> Position<BodyFixed> {
-    let inertial = body_matrix(datum.model(), out_at).tr_mul(&xyz_m);
-    body_rotation(body, into_at).apply(&Position::new(inertial))
+    DatumConversion::of(body, datum, out_at, into_at).apply(&xyz_m)
 }

@@ -10,9 +10,8 @@ use super::{
     product::{Content, Declaration, Program, Role, Use, Write},
     table::{Column, Meaning, Table, Unit, column, meanings},
     text_table,
-    utc::Utc,
 };
-use areograph_base::{footprints::Footprints, frames::BodyFixed, schema::DocumentSchema};
+use areograph_base::{footprints::Footprints, frames::BodyFixed, schema::DocumentSchema, utc::Utc};
 use areograph_config::ShotFormat;
 use areograph_geom::{
     ellipsoid::{AreocentricLatitude, spherical_to_xyz_m},
@@ -100,8 +99,10 @@ pub(super) trait ShotNames: Sync {
     /// Identifiers of the windows that hold the shot in this row, separated by semicolons.
     fn windows(&self, row: usize) -> String;
 
-    /// Its UTC, if known.
-    fn utc(&self, row: usize) -> String;
+    /// Its UTC; of sources without it, for tables without this column, an arbitrary instant.
+    fn utc(&self, _row: usize) -> Utc {
+        Utc::from_microseconds(0)
+    }
 }
 
 impl ShotNames for SiteProducts<'_> {
@@ -109,8 +110,8 @@ impl ShotNames for SiteProducts<'_> {
         self.window_ids(self.footprints.windows[row])
     }
 
-    fn utc(&self, row: usize) -> String {
-        self.utc[row].clone()
+    fn utc(&self, row: usize) -> Utc {
+        self.utc[row]
     }
 }
 
@@ -145,13 +146,13 @@ impl<'a> Shot<'a> {
         of(self.footprints)[self.row]
     }
 
-    pub(super) fn utc(&self) -> String {
+    pub(super) fn utc(&self) -> Utc {
         self.names.utc(self.row)
     }
 
     /// Height above the areoid, after the crossover correction, metres.
     pub(super) fn topography_m(&self) -> f64 {
-        self.footprints.row(self.row).topography_m()
+        self.footprints.topography_of_m(self.row)
     }
 
     fn areographic_deg(&self) -> f64 {
@@ -160,9 +161,10 @@ impl<'a> Shot<'a> {
     }
 
     fn xyz_m(&self, axis: usize) -> f64 {
-        let shot = self.footprints.row(self.row);
+        let longitude_rad = self.get(|of| &of.longitude_rad);
+        let latitude_rad = self.get(|of| &of.latitude_rad);
         let radius_m = self.footprints.ground_radius_m(self.row);
-        spherical_to_xyz_m(shot.longitude_rad, shot.latitude_rad, radius_m)[axis]
+        spherical_to_xyz_m(longitude_rad, latitude_rad, radius_m)[axis]
     }
 
     pub(super) fn point_deg(&self) -> [f64; 2] {
@@ -175,7 +177,13 @@ impl<'a> Shot<'a> {
 
 /// All footprints of a site.
 pub(super) fn table<'a>(site: &'a SiteProducts<'a>) -> Table<'a> {
-    Table::new(columns(), Shot::all(site)).in_terms(&site.config.terms())
+    let footprints = site.footprints;
+    let shot = |row| Shot {
+        footprints,
+        names: site,
+        row,
+    };
+    Table::of(columns(), footprints.len(), shot).in_terms(&site.config.terms())
 }
 
 /// The footprints of a site for GIS.
@@ -189,7 +197,7 @@ pub(super) fn features<'a>(site: &'a SiteProducts<'a>) -> Features<'a> {
     Features::of_footprints(
         body,
         &site.config.site,
-        site.utc.iter().max().map_or("", String::as_str),
+        site.newest_utc(),
         Shot::all(site).iter().map(point).collect(),
         table(site),
     )
@@ -253,11 +261,9 @@ fn identity<'a>() -> Vec<Column<Shot<'a>>> {
         )
         .in_gis()
         .in_dbase("et_s", 20, 6),
-        column("utc", Unit::None, "et_s as UTC, ISO 8601", |shot: &Shot| {
-            Utc::of(&shot.utc())
-        })
-        .in_gis()
-        .in_dbase("utc", 0, 0),
+        column("utc", Unit::None, "et_s as UTC, ISO 8601", Shot::utc)
+            .in_gis()
+            .in_dbase("utc", 0, 0),
         column(
             "orbit",
             Unit::None,

@@ -57,10 +57,6 @@ impl ShotNames for FoundShots<'_> {
         let ids = windows.filter_map(|window| self.window_ids.get(*window as usize));
         ids.map(String::as_str).collect::<Vec<_>>().join(";")
     }
-
-    fn utc(&self, _row: usize) -> String {
-        String::new()
-    }
 }
 
 impl FoundShots<'_> {

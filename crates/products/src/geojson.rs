@@ -80,7 +80,7 @@ impl Serialize for Properties<'_> {
                 Values::Natural(of) => map.serialize_entry(name, &of[self.row])?,
                 Values::Integer(of) => map.serialize_entry(name, &of[self.row])?,
                 Values::Flag(of) => map.serialize_entry(name, &of[self.row])?,
-                Values::Time(of) => map.serialize_entry(name, &of[self.row].to_string())?,
+                Values::Time(of) => map.serialize_entry(name, &format!("{}Z", of[self.row]))?,
                 Values::Text(of) => map.serialize_entry(name, &of[self.row])?,
                 Values::Bytes(_) => {}
             }

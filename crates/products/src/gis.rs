@@ -36,7 +36,7 @@ pub(super) struct Features<'a> {
     /// Name of the points, in the plural: the table of a GeoPackage.
     pub(super) table: &'static str,
     /// UTC of the newest, for formats that hold a date: a clock would give different bytes each time.
-    pub(super) newest_utc: &'a str,
+    pub(super) newest_utc: String,
     /// The body.
     pub(super) body: Body,
     /// Frame of longitudes and latitudes.
@@ -54,7 +54,7 @@ impl<'a> Features<'a> {
     pub(super) fn of_footprints(
         body: Body,
         name: &'a str,
-        newest_utc: &'a str,
+        newest_utc: String,
         points: Vec<[f64; 3]>,
         attributes: Table<'a>,
     ) -> Self {
@@ -79,11 +79,10 @@ impl<'a> Features<'a> {
 
 #[cfg(test)]
 pub(super) mod tests {
+    use areograph_base::utc::Utc;
+
     use super::*;
-    use crate::{
-        table::{Unit, column},
-        utc::Utc,
-    };
+    use crate::table::{Unit, column};
 
     /// Two points with a time, the square root of 1 and of 2, a number and texts.
     pub(crate) fn example() -> Features<'static> {
@@ -92,7 +91,7 @@ pub(super) mod tests {
                 .in_gis()
                 .in_dbase("et_s", 20, 6),
             column("utc", Unit::None, "", |_: &f64| {
-                Utc::of("1999-08-24T14:12:13.000")
+                Utc::from_microseconds(935_503_933_000_000)
             })
             .in_gis()
             .in_dbase("utc", 0, 0),
@@ -115,7 +114,7 @@ pub(super) mod tests {
             body: Body::Mars,
             frame: "a frame",
             z: point_z_height(Body::Mars),
-            newest_utc: "1999-08-24T14:12:13.000",
+            newest_utc: "1999-08-24T14:12:13.000".to_owned(),
             points: vec![[0.1 + 0.2, -0.0, -1950.25], [2.0, -0.0, -1950.25]],
             attributes: Table::new(columns, vec![1.0, 2.0]),
         }

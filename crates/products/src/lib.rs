@@ -64,7 +64,6 @@ mod site_book;
 mod table;
 mod text_table;
 mod ties;
-mod utc;
 
 use std::path::Path;
 

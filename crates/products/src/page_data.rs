@@ -1,9 +1,10 @@
-//! The book of a site's outputs as a product: the page can be regenerated from it without other files.
+//! The book of a site's outputs as a product: the page can be regenerated from it and the tables beside it.
 //!
 //! Tables and documents are written for their readers, with the digits and the selection that these need. The page
-//! shows more: surfaces, histograms, spans of kernels. The outputs are therefore kept completely. Camera tables and map
-//! pixels, which no page shows, are omitted. So are the points of images without plots: at a site of a thousand images
-//! they amounted to a quarter of a gigabyte.
+//! shows more: surfaces, histograms, spans of kernels. The outputs are therefore kept, without what a table has in
+//! the same numbers: residuals of the range check, and places of footprints in images. Camera tables and map pixels,
+//! which no page shows, are omitted. So are the points of images without plots: at a site of a thousand images they
+//! amounted to a quarter of a gigabyte.
 
 use std::path::{Path, PathBuf};
 
@@ -13,7 +14,9 @@ use super::{
     error::ProductError,
     files::{create, finish},
     product::{self, Content, Declaration, Role},
-    read::ReadError,
+    ranges,
+    read::{ReadError, read_points, read_residuals},
+    registration,
     site::SiteProducts,
     site_book::SiteBook,
 };
@@ -21,16 +24,22 @@ use areograph_base::error::{Locate, Result};
 use areograph_config::SiteConfig;
 use areograph_spice::KernelSet;
 use areograph_stages::{
-    orientation::Orientation, register::ImageRegistration, search_footprints::SearchResult,
+    adjust::Adjusted,
+    check_ranges::{RangeCheck, ShotResiduals},
+    group_profiles::Profile,
+    orientation::Orientation,
+    register::ImageRegistration,
+    search_footprints::SearchResult,
     tabulate_kernels::KernelTables,
 };
 use areograph_store::{
     book::Book,
     files::{file_name, hash_file},
+    stage::Round,
 };
 
 /// Types of the outputs and their layout. The number is raised when one of them changes without a new version.
-const LAYOUT: &str = concat!("version ", env!("CARGO_PKG_VERSION"), ", layout 2");
+const LAYOUT: &str = concat!("version ", env!("CARGO_PKG_VERSION"), ", layout 3");
 
 /// Its path below a site's folder.
 pub const PAGE_DATA: &str = "report/page.postcard";
@@ -38,7 +47,7 @@ pub const PAGE_DATA: &str = "report/page.postcard";
 pub(super) static DATA: Declaration = Declaration {
     path: PAGE_DATA,
     what: "all data of the report, unrounded, in the layout of this version of areograph; BLAKE3 in the manifest",
-    readers: "`areograph report`",
+    readers: "`areograph report`, `areograph export`",
     rows: "",
     role: Role::Metadata,
     content: Content::Foreign,
@@ -47,12 +56,14 @@ pub(super) static DATA: Declaration = Declaration {
 };
 
 /// The configuration of a site as its page needs it; of paths only file names.
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 struct PageConfig {
     /// In TOML: postcard cannot represent infinite or absent values.
     config: String,
     /// Names of the PEDR files, which the serialised configuration omits.
     pedr_files: Vec<String>,
+    /// Indices of the images with plots.
+    shown: Vec<usize>,
 }
 
 /// The data of a page, read from their product.
@@ -69,8 +80,9 @@ impl PageData {
     /// A file of kind input that this version did not write; an error of the disk.
     pub fn read(site_folder: &Path) -> Result<Self> {
         let path = site_folder.join(PAGE_DATA);
-        let book = Book::open(&path, LAYOUT)?;
-        let stored = book.of::<PageConfig>().in_file(&path)?;
+        let mut book = Book::open(&path, LAYOUT)?;
+        let stored: PageConfig = book.of::<PageConfig>().in_file(&path)?.clone();
+        fill(&mut book, site_folder, &stored.shown)?;
         let mut config: SiteConfig = toml::from_str(&stored.config)
             .map_err(ReadError::unreadable("a configuration"))
             .in_file(&path)?;
@@ -108,18 +120,50 @@ fn page_book(site: &SiteProducts) -> Result<Book> {
     let stored = PageConfig {
         config: config.to_string(),
         pedr_files: pedr_files.map(|path| file_name(path)).collect(),
+        shown: site.shown_images(),
     };
-    let shown = site.shown_images();
     let mut book = site.book.lightened()?;
     book.enter_value("configuration", stored)?;
     book.leave_out::<SearchResult>();
     book.leave_out::<KernelTables>();
-    book.change(|_, orientation: &Orientation| Some(orientation.without_tables()))?;
-    book.change(|index, registration: &ImageRegistration| {
-        let is_shown = shown.binary_search(&index).is_ok();
-        (!is_shown).then(|| registration.without_points())
+    for round in [Round::Initial, Round::Matching, Round::Adjusted] {
+        book.change(round, |_, of: &Orientation| Some(of.without_tables()))?;
+    }
+    for (round, _) in registration_tables(&book) {
+        book.change(round, |_, of: &ImageRegistration| Some(of.without_points()))?;
+    }
+    book.change(Round::Initial, |_, of: &RangeCheck| {
+        Some(of.with_shots(ShotResiduals::default()))
     })?;
     Ok(book)
+}
+
+/// The tables with the points of registrations, by their round.
+fn registration_tables(book: &Book) -> Vec<(Round, &'static str)> {
+    let mut tables = vec![(Round::Initial, registration::TABLE.path)];
+    if book.has::<Adjusted>(Round::Initial) {
+        tables.push((Round::Adjusted, registration::ADJUSTED.path));
+    }
+    tables
+}
+
+/// Adds to the book what the tables of the site have.
+fn fill(book: &mut Book, site_folder: &Path, shown: &[usize]) -> Result<()> {
+    let profiles = book.of::<Vec<Profile>>()?.iter();
+    let profiles: Vec<String> = profiles.map(|profile| profile.id.clone()).collect();
+    let residuals = read_residuals(&site_folder.join(ranges::TABLE.path), &profiles)?;
+    book.change(Round::Initial, |_, of: &RangeCheck| {
+        Some(of.with_shots(residuals.clone()))
+    })?;
+    for (round, table) in registration_tables(book) {
+        let images = book.parts::<ImageRegistration>(round)?;
+        let images: Vec<String> = images.iter().map(|of| of.image.clone()).collect();
+        let points = read_points(&site_folder.join(table), &images, &profiles, shown)?;
+        book.change(round, |index, of: &ImageRegistration| {
+            Some(of.with_points(points.get(index)?.clone()))
+        })?;
+    }
+    Ok(())
 }
 
 /// Writes the data of the page of `site`, and checks that the file holds them.

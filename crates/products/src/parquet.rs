@@ -10,8 +10,10 @@ use ::parquet::{
     errors::ParquetError,
 };
 use arrow_array::{
-    ArrayRef, BinaryArray, BooleanArray, Float64Array, Int32Array, RecordBatch, StringArray,
-    TimestampMicrosecondArray, UInt32Array,
+    Array as _, ArrayRef, BinaryArray, BooleanArray, Float64Array, GenericByteArray, Int32Array,
+    RecordBatch, StringArray, TimestampMicrosecondArray, UInt32Array,
+    cast::AsArray as _,
+    types::{ByteArrayType, Float64Type},
 };
 use arrow_schema::{DataType, Field, Schema, SchemaRef, TimeUnit};
 use rayon::prelude::*;
@@ -20,10 +22,12 @@ use super::{
     error::ProductError,
     files::{create, finish, open},
     parquet_file::ParquetFile,
-    table::{Kind, Meaning, Table, Values},
+    table::{Kind, Meaning, ROWS_AT_ONCE, Table, Values},
+};
+use areograph_base::{
+    error::{Error, IoError, Locate, Result},
     utc::Utc,
 };
-use areograph_base::error::{Error, IoError, Locate, Result};
 
 /// Zone of instants in the schema of a file.
 const UTC: &str = "UTC";
@@ -34,20 +38,69 @@ const UTC: &str = "UTC";
 /// Numbers that are not finite; errors of the disk; columns and values that are read back differently.
 pub(super) fn write(path: &Path, table: &Table, metadata: Vec<(&str, String)>) -> Result<u64> {
     let mut file = create(path)?;
-    encode(&mut file, table, metadata).in_file(path)?;
+    let digests = encode(&mut file, table, metadata).in_file(path)?;
     finish(path, file)?;
-    read_back(path, table).in_file(path)?;
+    read_back(path, table, &digests).in_file(path)?;
     Ok(table.rows() as u64)
 }
 
-fn encode(file: impl Write + Send, table: &Table, metadata: Vec<(&str, String)>) -> Result<()> {
+/// Digests of the columns of a piece of a table.
+type Digests = Vec<blake3::Hash>;
+
+/// Writes the table; returns the digests of its pieces.
+fn encode(
+    file: impl Write + Send,
+    table: &Table,
+    metadata: Vec<(&str, String)>,
+) -> Result<Vec<Digests>> {
     let schema = schema(table);
     let mut file = ParquetFile::new(file, Arc::clone(&schema)).map_err(refused)?;
+    let mut digests = Vec::new();
     for rows in table.pieces() {
         let batch = record_batch(table, &schema, rows)?;
         file.write(&batch).map_err(refused)?;
+        digests.push(batch.columns().par_iter().map(digest).collect());
     }
-    file.finish(metadata).map_err(refused)
+    file.finish(metadata).map_err(refused)?;
+    Ok(digests)
+}
+
+/// Digest of the values of an array of one of the types that tables have.
+fn digest(array: &ArrayRef) -> blake3::Hash {
+    let mut hasher = blake3::Hasher::new();
+    match array.data_type() {
+        DataType::Float64 if array.null_count() > 0 => {
+            // Tables contain no NaN: here it represents a missing value.
+            let values = array.as_primitive::<Float64Type>().iter();
+            let values = values.flat_map(|of| of.unwrap_or(f64::NAN).to_le_bytes());
+            hasher.update(&values.collect::<Vec<u8>>());
+        }
+        DataType::Boolean => {
+            let values = array.as_boolean().values().iter();
+            hasher.update(&values.map(u8::from).collect::<Vec<u8>>());
+        }
+        DataType::Utf8 => update_pieces(&mut hasher, array.as_string::<i32>()),
+        DataType::Binary => update_pieces(&mut hasher, array.as_binary::<i32>()),
+        _ => {
+            for buffer in array.to_data().buffers() {
+                hasher.update(buffer.as_slice());
+            }
+        }
+    }
+    hasher.finalize()
+}
+
+/// Adds the lengths and the bytes of texts or other sequences of bytes.
+fn update_pieces<T: ByteArrayType<Offset = i32>>(
+    hasher: &mut blake3::Hasher,
+    array: &GenericByteArray<T>,
+) {
+    let offsets = array.value_offsets();
+    let lengths = offsets
+        .windows(2)
+        .flat_map(|of| (of[1] - of[0]).to_le_bytes());
+    hasher.update(&lengths.collect::<Vec<u8>>());
+    hasher.update(array.value_data());
 }
 
 /// An error of the disk, or the library's.
@@ -111,7 +164,7 @@ fn array(values: Values) -> ArrayRef {
         Values::Integer(values) => Arc::new(Int32Array::from(values)),
         Values::Flag(values) => Arc::new(BooleanArray::from(values)),
         Values::Time(values) => {
-            let values = values.into_iter().map(|Utc(of)| of);
+            let values = values.into_iter().map(Utc::microseconds);
             let times = TimestampMicrosecondArray::from_iter_values(values);
             Arc::new(times.with_timezone(UTC))
         }
@@ -120,12 +173,11 @@ fn array(values: Values) -> ArrayRef {
     }
 }
 
-/// Compares the file with the table, group by group on all threads.
-fn read_back(path: &Path, table: &Table) -> Result<()> {
+/// Compares the file with the digests of the table, group by group on all threads.
+fn read_back(path: &Path, table: &Table, digests: &[Digests]) -> Result<()> {
     let metadata = ArrowReaderMetadata::load(&open(path)?, ArrowReaderOptions::default())
         .map_err(ProductError::unreadable)?;
-    let schema = schema(table);
-    if metadata.schema().fields() != schema.fields() {
+    if metadata.schema().fields() != schema(table).fields() {
         let what = "names, types, units or descriptions of columns".to_owned();
         return Err(ProductError::ReadBack { what }.into());
     }
@@ -144,9 +196,10 @@ fn read_back(path: &Path, table: &Table) -> Result<()> {
         let file = open(path)?;
         let batches = ParquetRecordBatchReaderBuilder::new_with_metadata(file, metadata.clone())
             .with_row_groups(vec![group])
+            .with_batch_size(ROWS_AT_ONCE)
             .build()
             .map_err(ProductError::unreadable)?;
-        compare(batches, rows, table, &schema)
+        compare(batches, rows, table, digests)
     });
     let compared: Vec<Result<()>> = compared.collect();
     compared.into_iter().collect()
@@ -162,30 +215,24 @@ fn require_rows(found: usize, expected: usize) -> Result<()> {
     .into())
 }
 
-/// Compares these rows of the table with the rows of a file.
+/// Compares these rows of a file with the digests of the table, whose pieces begin where groups do.
 fn compare(
     batches: ParquetRecordBatchReader,
     range: &Range<usize>,
     table: &Table,
-    schema: &SchemaRef,
+    digests: &[Digests],
 ) -> Result<()> {
-    let mut rows = range.start;
-    for batch in batches {
+    let mut row = range.start;
+    for (batch, expected) in batches.zip(digests.iter().skip(row / ROWS_AT_ONCE)) {
         let batch = batch.map_err(ProductError::unreadable)?;
-        let end = rows + batch.num_rows();
-        let expected = record_batch(table, schema, rows..end.min(range.end))?;
-        for (column, (found, expected)) in table
-            .columns()
-            .zip(batch.columns().iter().zip(expected.columns()))
-        {
-            if found != expected {
-                return Err(ProductError::ReadBack {
-                    what: format!("column {}, from row {}", column.name, rows + 1),
-                }
-                .into());
+        let columns = batch.columns().iter().zip(expected);
+        for (column, (found, expected)) in table.columns().zip(columns) {
+            if digest(found) != *expected {
+                let what = format!("column {}, from row {}", column.name, row + 1);
+                return Err(ProductError::ReadBack { what }.into());
             }
         }
-        rows = end;
+        row += batch.num_rows();
     }
-    require_rows(rows, range.end)
+    require_rows(row, range.end)
 }

@@ -122,24 +122,29 @@ impl<W: Write + Send> ParquetFile<W> {
     }
 }
 
-/// Encoding by which a column compresses best: measured numbers, which rarely repeat, byte by byte, all others
-/// through a dictionary.
+/// Encoding by which a column compresses best: measured numbers, which rarely repeat, byte by byte; counts and times, which
+/// grow in steps, by their differences; geometries as they are; all others through a dictionary.
 fn encoded(
     properties: WriterPropertiesBuilder,
     field: &Field,
     above: &[String],
 ) -> WriterPropertiesBuilder {
     let path = [above, &[field.name().clone()]].concat();
+    let plain = |properties: WriterPropertiesBuilder, encoding| {
+        let path = ColumnPath::new(path.clone());
+        properties
+            .set_column_dictionary_enabled(path.clone(), false)
+            .set_column_encoding(path, encoding)
+    };
     match field.data_type() {
         DataType::Struct(parts) => parts
             .iter()
             .fold(properties, |of, part| encoded(of, part, &path)),
-        DataType::Float64 => {
-            let path = ColumnPath::new(path);
-            properties
-                .set_column_dictionary_enabled(path.clone(), false)
-                .set_column_encoding(path, Encoding::BYTE_STREAM_SPLIT)
+        DataType::Float64 => plain(properties, Encoding::BYTE_STREAM_SPLIT),
+        DataType::UInt32 | DataType::Timestamp(..) => {
+            plain(properties, Encoding::DELTA_BINARY_PACKED)
         }
+        DataType::Binary => plain(properties, Encoding::PLAIN),
         _ => properties,
     }
 }

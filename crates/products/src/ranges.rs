@@ -13,8 +13,8 @@ use super::{
     table::{Column, Table, Unit, column, meanings},
 };
 use areograph_base::{
-    altimetry::MolaClock, body::Body, footprints::Footprint, schema::DocumentSchema,
-    season::solar_longitude_rad,
+    altimetry::MolaClock, body::Body, footprints::Footprints, frames::BodyFixed,
+    schema::DocumentSchema, season::solar_longitude_rad,
 };
 use areograph_config::RangeCheckConfig;
 use areograph_geom::{
@@ -186,8 +186,9 @@ pub(super) static TABLE: Declaration = Declaration {
     content: Content::Table(|| meanings(&columns())),
     write: Write::Site(|path, of| {
         let site = of.site;
-        let shots = (0..site.ranges.shots.len()).map(|at| RangedShot { site, at });
-        let table = Table::new(columns(), shots.collect()).in_terms(&of.site.config.terms());
+        let shots = site.ranges.shots.len();
+        let table = Table::of(columns(), shots, |at| RangedShot { site, at })
+            .in_terms(&of.site.config.terms());
         parquet::write(path, &table, Vec::new()).map(Some)
     }),
     uses: &[],
@@ -218,8 +219,9 @@ impl RangedShot<'_> {
         self.site.ranges.shots.row[self.at]
     }
 
-    fn footprint(&self) -> Footprint {
-        self.site.footprints.row(self.row() as usize)
+    /// The column of footprints that `of` picks, in the row of the shot.
+    fn footprint<T: Copy>(&self, of: fn(&Footprints<BodyFixed>) -> &Vec<T>) -> T {
+        of(self.site.footprints)[self.row() as usize]
     }
 
     fn profile(&self) -> String {
@@ -267,10 +269,10 @@ fn columns<'a>() -> Vec<Column<RangedShot<'a>>> {
             "et_s",
             Unit::Second,
             "time of the shot after the {altimeter} clock correction, TDB seconds past J2000",
-            |shot: &RangedShot| shot.footprint().et_s,
+            |shot: &RangedShot| shot.footprint(|of| &of.et_s),
         ),
         column("orbit", Unit::None, "orbit number", |shot: &RangedShot| {
-            shot.footprint().orbit
+            shot.footprint(|of| &of.orbit)
         }),
         residual("range_minus_distance_m", definition(0), |shots| {
             &shots.range_minus_distance_m

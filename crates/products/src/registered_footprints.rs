@@ -17,7 +17,6 @@ use super::{
     site::{ImageProducts, SiteProducts},
     table::{Column, Meaning, Table, Unit, column, meanings},
     text_table,
-    utc::Utc,
 };
 use areograph_config::ShotFormat;
 use areograph_stages::{
@@ -194,19 +193,23 @@ fn places(
     before: &ImageProducts,
     after: Option<&ImageProducts>,
 ) -> BTreeMap<usize, (usize, [Option<Place>; 2])> {
+    let rounds = [Some(before), after];
+    let rounds = rounds.map(|image| image.map(|image| &image.registration.points));
     let mut places: BTreeMap<usize, (usize, [Option<Place>; 2])> = BTreeMap::new();
-    for (round, image) in [Some(before), after].into_iter().enumerate() {
-        let Some(points) = image.map(|image| &image.registration.points) else {
-            continue;
-        };
+    // Few of the points are inside an image.
+    for points in rounds.into_iter().flatten() {
+        let inside = (0..points.len()).filter(|at| points.inside[*at]);
+        places.extend(inside.map(|at| (points.row[at] as usize, (usize::MAX, [None; 2]))));
+    }
+    for (round, points) in rounds.into_iter().enumerate() {
+        let Some(points) = points else { continue };
         for at in 0..points.len() {
-            let profile = points.profile[at] as usize;
-            let entry = places.entry(points.row[at] as usize);
-            let (_, of_rounds) = entry.or_insert((profile, [None; 2]));
-            of_rounds[round].get_or_insert(Place::of(points, at));
+            if let Some((profile, of_rounds)) = places.get_mut(&(points.row[at] as usize)) {
+                *profile = (*profile).min(points.profile[at] as usize);
+                of_rounds[round].get_or_insert(Place::of(points, at));
+            }
         }
     }
-    places.retain(|_, (_, places)| places.iter().flatten().any(|place| place.inside));
     places
 }
 
@@ -228,7 +231,7 @@ fn features<'a>(of: &Context<'a>, rows: Vec<Row<'a>>) -> Features<'a> {
         [east_deg, north_deg, row.height_m()]
     });
     let points = points.collect();
-    let newest_utc = site.utc.iter().max().map_or("", String::as_str);
+    let newest_utc = site.newest_utc();
     let name = &site.config.site;
     Features {
         table: LAYER,
@@ -294,7 +297,7 @@ fn shot<'a>() -> Vec<Column<Row<'a>>> {
             |row: &Row| u32::try_from(row.footprint).unwrap_or(u32::MAX),
         ),
         column("utc", Unit::None, "time et_s in UTC", |row: &Row| {
-            Utc::of(&row.site.utc[row.footprint])
+            row.site.utc[row.footprint]
         }),
         column(
             "et_s",

@@ -20,11 +20,11 @@ use super::{
     parquet_file::ParquetFile,
     table::{ROWS_OF_A_TASK, Values, pieces},
     text_table,
-    utc::Utc,
 };
 use areograph_base::{
     body::Body,
     error::{Cause, IoError, Locate, Result},
+    utc::Utc,
 };
 use areograph_store::files::{Mark, MarkAt, StagedFile};
 
@@ -324,7 +324,13 @@ fn values_of(name: &str, array: &ArrayRef) -> Result<Values> {
         }
         DataType::Timestamp(TimeUnit::Microsecond, Some(_)) if is_whole => {
             let times = array.as_primitive::<types::TimestampMicrosecondType>();
-            Values::Time(times.values().iter().map(|of| Utc(*of)).collect())
+            Values::Time(
+                times
+                    .values()
+                    .iter()
+                    .map(|of| Utc::from_microseconds(*of))
+                    .collect(),
+            )
         }
         DataType::Utf8 => {
             let texts = array.as_string::<i32>().iter();

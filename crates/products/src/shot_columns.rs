@@ -35,10 +35,6 @@ impl ShotNames for Nameless {
     fn windows(&self, _row: usize) -> String {
         String::new()
     }
-
-    fn utc(&self, _row: usize) -> String {
-        String::new()
-    }
 }
 
 fn table(shots: Vec<Shot<'_>>) -> Table<'_> {

@@ -10,6 +10,7 @@ use areograph_base::{
     error::Result,
     footprints::Footprints,
     frames::BodyFixed,
+    utc::Utc,
 };
 use areograph_config::{ShotFormat, SiteConfig, UsedBias};
 use areograph_spice::{KernelSet, RequiredCoverage};
@@ -58,8 +59,8 @@ pub struct SiteProducts<'a> {
     pub conversions: &'a [FileConversion],
     /// Footprints in IAU 2000.
     pub footprints: &'a Footprints<BodyFixed>,
-    /// UTC of every footprint's corrected time, ISO 8601, without a zone letter.
-    pub utc: &'a [String],
+    /// UTC of every footprint's corrected time.
+    pub utc: &'a [Utc],
     /// Profiles in order.
     pub profiles: &'a [Profile],
     /// The profiles against each other.
@@ -175,6 +176,12 @@ impl<'a> ImageProducts<'a> {
 }
 
 impl<'a> SiteProducts<'a> {
+    /// UTC of the newest shot as text, for formats that state a date; empty without shots.
+    pub(super) fn newest_utc(&self) -> String {
+        let newest = self.utc.iter().max();
+        newest.map_or_else(String::new, Utc::to_string)
+    }
+
     /// The pointing biases with which kernels were read; empty if support data orient all images.
     #[must_use]
     pub fn pointing_biases(&self) -> Vec<UsedBias<'a>> {
@@ -285,11 +292,7 @@ impl<'a> SiteProducts<'a> {
                 self.conversions.len(),
                 self.footprints.files.len(),
             ),
-            (
-                "UTC strings of footprints",
-                self.utc.len(),
-                self.footprints.len(),
-            ),
+            ("UTC of footprints", self.utc.len(), self.footprints.len()),
             (
                 "range statistics of profiles",
                 self.ranges.profiles.len(),

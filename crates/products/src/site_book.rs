@@ -15,6 +15,7 @@ use areograph_spice::KernelSet;
 use areograph_stages::{
     adjust::Adjusted, compare_pairs::PairComparison, convert_datum::Converted,
     describe_kernels::KernelDescription, intersect::IntersectedTies, judge::Verdict,
+    tag_utc::ShotTimes,
 };
 use areograph_store::{book::Book, stage::Round};
 
@@ -98,7 +99,7 @@ impl SiteBook<'_> {
             images: &images,
             conversions: &converted.files,
             footprints: &converted.footprints,
-            utc: book.of::<Vec<String>>()?,
+            utc: &book.of::<ShotTimes>()?.0,
             profiles: book.of::<Vec<_>>()?,
             profile_check: book.of()?,
             ranges: book.of()?,

@@ -9,11 +9,11 @@ use std::{borrow::Cow, ops::Range};
 
 use rayon::prelude::*;
 
-use super::{error::ProductError, utc::Utc};
-use areograph_base::terms::Terms;
+use super::error::ProductError;
+use areograph_base::{terms::Terms, utc::Utc};
 
 /// Rows whose values are in memory at once.
-const ROWS_AT_ONCE: usize = 65_536;
+pub(super) const ROWS_AT_ONCE: usize = 65_536;
 /// Rows that a thread converts into text at once, and number of such tasks in a wave: the text of a wave, 3 MB per
 /// thread, is kept in memory.
 pub(super) const ROWS_OF_A_TASK: usize = 2_048;
@@ -225,7 +225,7 @@ impl Cell for Option<f64> {
 }
 
 impl Values {
-    /// The first row that is not a finite number or a known instant.
+    /// The first row that is not a finite number.
     fn not_finite(&self) -> Option<usize> {
         match self {
             Self::Real(values) => values.iter().position(|value| !value.is_finite()),
@@ -233,7 +233,6 @@ impl Values {
                 let infinite = |value: &Option<f64>| value.is_some_and(|value| !value.is_finite());
                 values.iter().position(infinite)
             }
-            Self::Time(values) => values.iter().position(|value| *value == Utc::UNKNOWN),
             _ => None,
         }
     }
@@ -247,6 +246,22 @@ pub(super) struct Table<'a> {
 }
 
 impl<'a> Table<'a> {
+    /// The table of `count` rows, each made from its number when its values are computed.
+    pub(super) fn of<R: Sync + 'a>(
+        columns: Vec<Column<R>>,
+        count: usize,
+        row: impl Fn(usize) -> R + Sync + 'a,
+    ) -> Self {
+        Self {
+            columns: meanings(&columns).into_iter().enumerate().collect(),
+            rows: count,
+            values: Box::new(move |column, range| {
+                let rows: Vec<R> = range.map(&row).collect();
+                (columns[column].values)(&rows)
+            }),
+        }
+    }
+
     /// The table of these rows.
     pub(super) fn new<R: Sync + 'a>(columns: Vec<Column<R>>, rows: Vec<R>) -> Self {
         Self {
@@ -408,7 +423,7 @@ pub(super) mod tests {
                 none("text").in_dbase("text", 0, 0).last_in_gis(),
                 column("bytes", Unit::None, "", |(): &()| vec![1_u8]),
                 column("number_m", Unit::Metre, "", |(): &()| 1.0).in_dbase("number", 5, 1),
-                column("utc", Unit::None, "", |(): &()| Utc(0)).in_gis(),
+                column("utc", Unit::None, "", |(): &()| Utc::from_microseconds(0)).in_gis(),
             ];
             Table::new(columns, vec![()])
         };

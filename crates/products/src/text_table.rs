@@ -139,7 +139,7 @@ fn put_cell(text: &mut Vec<u8>, decimals: Option<usize>, values: &Values, row: u
         Values::Natural(values) => put_whole(text, values[row]),
         Values::Integer(values) => put_whole(text, values[row]),
         Values::Flag(values) => put(text, format_args!("{}", values[row])),
-        Values::Time(values) => put(text, format_args!("{}", values[row])),
+        Values::Time(values) => put(text, format_args!("{}Z", values[row])),
         Values::Text(values) => text.extend_from_slice(values[row].as_bytes()),
         Values::Bytes(_) => {}
     }

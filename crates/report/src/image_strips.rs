@@ -85,7 +85,7 @@ fn strip<'a>(site: &SiteProducts<'a>, overlays: &'a Overlays, image: usize) -> O
 impl Shown {
     fn of(site: &SiteProducts, points: &RegisteredPoints) -> Self {
         let inside: Vec<usize> = (0..points.len()).filter(|at| points.inside[*at]).collect();
-        let height_m = |at: usize| site.footprints.row(points.row[at] as usize).topography_m();
+        let height_m = |at: usize| site.footprints.topography_of_m(points.row[at] as usize);
         let drawn = thinned(&inside, DOTS);
         Self {
             places: drawn

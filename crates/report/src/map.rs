@@ -142,7 +142,7 @@ impl Sheet {
     fn of(site: &SiteProducts, shown: Shown) -> Self {
         let (footprints, terms) = (site.footprints, site.config.terms());
         let place_rad = |row: usize| (footprints.longitude_rad[row], footprints.latitude_rad[row]);
-        let height_m = |row: usize| footprints.row(row).topography_m();
+        let height_m = |row: usize| footprints.topography_of_m(row);
         let shots: Vec<Shot> = thinned(&shown.rows, MAP_SHOTS)
             .into_iter()
             .map(|row| Shot {
@@ -202,7 +202,7 @@ impl Sheet {
             .enumerate()
             .filter_map(|(row, (longitude, latitude))| {
                 let place = self.map.project(*longitude, *latitude)?;
-                Some((place, footprints.row(row).topography_m()))
+                Some((place, footprints.topography_of_m(row)))
             });
         Relief::of(&self.view, shots)
     }
@@ -308,6 +308,7 @@ fn tracks(places: &[Option<(i32, i32)>]) -> Vec<Vec<(i32, i32)>> {
             f64::from(place.0 - last.0).hypot(f64::from(place.1 - last.1)) < TRACK_GAP
         };
         match tracks.last_mut() {
+            Some(track) if track.last() == Some(&place) => {}
             Some(track) if track.last().is_some_and(is_near) => track.push(place),
             _ => tracks.push(vec![place]),
         }
@@ -333,11 +334,14 @@ fn profiles(
     shown: &Shown,
     place_rad: impl Fn(usize) -> (f64, f64),
 ) -> Vec<(String, Vec<(f64, f64)>)> {
-    let on_sheet: std::collections::HashSet<usize> = shown.rows.iter().copied().collect();
+    let mut on_sheet = vec![false; site.footprints.len()];
+    for row in &shown.rows {
+        on_sheet[*row] = true;
+    }
     let mut named: BTreeMap<u32, Vec<(f64, f64)>> = BTreeMap::new();
     for profile in site.profiles {
         let rows = profile.rows.iter().map(|row| *row as usize);
-        let places = rows.filter(|row| on_sheet.contains(row)).map(&place_rad);
+        let places = rows.filter(|row| on_sheet[*row]).map(&place_rad);
         let places: Vec<(f64, f64)> = places.collect();
         if !places.is_empty() {
             named.entry(profile.orbit).or_insert(places);

@@ -12,7 +12,7 @@ use super::{
     section::Section,
     source::traced,
 };
-use areograph_base::{error::Result, footprints::AdjustmentModel};
+use areograph_base::{error::Result, footprints::AdjustmentModel, utc::Utc};
 use areograph_products::{Listed, SiteProducts};
 use areograph_stages::{
     compare_pairs::PairComparison,
@@ -64,20 +64,25 @@ fn headline(site: &SiteProducts) -> String {
 
 /// Subject of the page: description, dates of the data, counts.
 fn about(site: &SiteProducts) -> Markup {
-    let days = |dates: &mut dyn Iterator<Item = &str>| {
-        let mut days: Vec<String> = dates
-            .filter_map(|utc| Some(utc.get(..10)?.to_owned()))
-            .collect();
-        days.sort_unstable();
-        match (days.first(), days.last()) {
+    let days = |first: Option<String>, last: Option<String>| {
+        let day = |utc: String| utc.get(..10).map(str::to_owned);
+        match (first.and_then(day), last.and_then(day)) {
             (Some(first), Some(last)) if first == last => format!(" of {first}"),
             (Some(first), Some(last)) => format!(" of {first} to {last}"),
             _ => String::new(),
         }
     };
-    let taken = days(&mut site.images.iter().map(|image| &*image.times.utc_start));
+    let starts = || {
+        let starts = site.images.iter().map(|image| &image.times.utc_start);
+        starts.filter(|utc| !utc.is_empty()).cloned()
+    };
+    let taken = days(starts().min(), starts().max());
     let images = counted(site.images.len(), "image");
-    let shot = days(&mut site.utc.iter().map(String::as_str));
+    let instants = site.utc.iter();
+    let shot = days(
+        instants.clone().min().map(Utc::to_string),
+        instants.max().map(Utc::to_string),
+    );
     let footprints = counted(site.footprints.len(), "footprint");
     let profiles = counted(site.profiles.len(), "profile");
     let description = site.config.description.trim_end_matches('.');

@@ -1,8 +1,8 @@
 //! UTC of many instants.
 
-use areograph_base::{error::Result, time::Et};
+use areograph_base::{error::Result, time::Et, utc::Utc};
 
-use super::session::Session;
+use super::{error::SpiceError, session::Session};
 
 /// Digits of a second: programs read the time from it, and MGS flies 3 m in a millisecond.
 const DECIMALS: u8 = 6;
@@ -11,7 +11,7 @@ const SECOND_US: u32 = 1_000_000;
 /// Last second of an hour whose length no leap second changes.
 const LAST_S: u32 = 3_599;
 
-/// UTC as `et2utc` gives it. CSPICE, which takes 3 µs, is asked once for each hour of UTC; the other instants of the hour
+/// UTC as `et2utc` gives it, to a microsecond. CSPICE, which takes 3 µs, is asked once for each hour of UTC; the other instants of the hour
 /// are computed from it.
 ///
 /// From the full hour to its last regular second ET − UTC changes only by TDB − TT: by at most 1.2 µs, and linearly within
@@ -24,8 +24,7 @@ pub struct UtcClock<'a> {
 
 #[derive(Debug)]
 struct Hour {
-    /// Date and hour, `1999-08-24T14`.
-    text: String,
+    start: Utc,
     start_s: f64,
     /// Seconds of UTC in a second of ET.
     rate: f64,
@@ -56,28 +55,27 @@ impl<'a> UtcClock<'a> {
         }
     }
 
-    /// UTC of an instant with six digits of a second, ISO 8601 without a zone letter.
+    /// UTC of an instant.
     ///
     /// # Errors
-    /// As [`Session::et_to_utc_with`].
-    pub fn utc(&mut self, et: Et) -> Result<String> {
-        let within = self
-            .hour
-            .as_ref()
-            .and_then(|hour| Some((&hour.text, hour.microseconds(et)?)));
-        if let Some((text, since_us)) = within {
-            let (seconds, us) = (since_us / SECOND_US, since_us % SECOND_US);
-            let (minute, second) = (seconds / 60, seconds % 60);
-            return Ok(format!("{text}:{minute:02}:{second:02}.{us:06}"));
+    /// As [`Session::et_to_utc_with`]; [`SpiceError::NoCalendar`] outside the years of the calendar.
+    pub fn utc(&mut self, et: Et) -> Result<Utc> {
+        let hour = self.hour.as_ref();
+        if let Some((start, since_us)) = hour.and_then(|of| Some((of.start, of.microseconds(et)?)))
+        {
+            let since_us = i64::from(since_us);
+            return Ok(Utc::from_microseconds(start.microseconds() + since_us));
         }
-        let utc = self.session.et_to_utc_with(et, DECIMALS)?;
-        let Some((hour, _)) = utc.split_once(':') else {
+        let text = self.session.et_to_utc_with(et, DECIMALS)?;
+        let utc = Utc::parse(&text).ok_or_else(|| SpiceError::NoCalendar(text.clone()))?;
+        let Some((hour, _)) = text.split_once(':') else {
             return Ok(utc);
         };
-        let start_s = self.session.utc_to_et(&format!("{hour}:00:00"))?.seconds();
+        let full_hour = format!("{hour}:00:00");
+        let start_s = self.session.utc_to_et(&full_hour)?.seconds();
         let last_s = self.session.utc_to_et(&format!("{hour}:59:59"))?.seconds();
-        self.hour = Some(Hour {
-            text: hour.to_owned(),
+        self.hour = Utc::parse(&full_hour).map(|start| Hour {
+            start,
             start_s,
             rate: f64::from(LAST_S) / (last_s - start_s),
         });

@@ -1,6 +1,6 @@
 //! Conversion of footprints and the file's own spacecraft positions from the file's datum to the frame of the products.
 
-use std::sync::atomic::AtomicBool;
+use std::sync::{Mutex, PoisonError, atomic::AtomicBool};
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -16,12 +16,12 @@ use areograph_base::{
     units::{RADIANS_PER_DEGREE, wrap_pi},
 };
 use areograph_geom::{
-    body_rotation::convert_datum as convert_vector,
+    body_rotation::DatumConversion,
     ellipsoid::{Spherical, spherical_to_xyz_m},
     statistics::Summary,
 };
 use areograph_store::{
-    stage::{Output, Stage},
+    stage::{Input, Inputs, Output, Stage},
     stage_inputs,
 };
 
@@ -52,11 +52,35 @@ stage_inputs! {
     pub struct ConvertDatum<'a> {
         /// Results of the search.
         pub found: &'a Output<SearchResult>,
+        /// Its shots, if these were taken out of it.
+        pub shots: FoundShots,
         /// The clock of MOLA.
         pub altimeter_clock: &'a MolaClock,
         /// The radius of the ground.
         pub ground: &'a GroundRadius,
     }
+}
+
+/// Shots taken out of the results of a search, which are converted in place: a million occupy a fifth of a gigabyte.
+#[derive(Debug)]
+pub struct FoundShots(Mutex<Option<Footprints<AsRead>>>);
+
+impl FoundShots {
+    /// These shots; `None` if the results still have them.
+    #[must_use]
+    pub const fn of(shots: Option<Footprints<AsRead>>) -> Self {
+        Self(Mutex::new(shots))
+    }
+
+    fn take(&self) -> Option<Footprints<AsRead>> {
+        let mut shots = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        shots.take()
+    }
+}
+
+/// The results of the search represent them.
+impl Input for FoundShots {
+    fn add_to(&self, _field: &str, _inputs: &mut Inputs) {}
 }
 
 impl Stage for ConvertDatum<'_> {
@@ -67,7 +91,10 @@ impl Stage for ConvertDatum<'_> {
     stage_inputs!(fingerprint);
 
     fn run(&self, _stop: &AtomicBool) -> Result<Converted> {
-        let mut footprints = self.found.value()?.footprints.clone();
+        let mut footprints = match self.shots.take() {
+            Some(shots) => shots,
+            None => self.found.value()?.footprints.clone(),
+        };
         footprints.ground = *self.ground;
         let choice = footprints.ground_choice();
         let mut converted = convert_datum(footprints, self.altimeter_clock);
@@ -107,39 +134,78 @@ pub fn convert_datum(footprints: Footprints<AsRead>, clock: &MolaClock) -> Conve
             )
         })
         .collect();
-    let before = [&footprints.longitude_rad, &footprints.latitude_rad].map(Clone::clone);
-    let converted = turned(footprints, clock);
+    let mut shifts = vec![(Vec::new(), Vec::new()); footprints.files.len()];
+    let footprints = turned(footprints, clock, |file, shift| {
+        let (shift_m, turn_deg) = &mut shifts[file];
+        shift_m.push(shift.ground_m);
+        turn_deg.push(shift.turn_rad / RADIANS_PER_DEGREE);
+    });
+    let conversion = |(shift_m, turn_deg): &(Vec<f64>, Vec<f64>)| FileConversion {
+        shots: u32::try_from(shift_m.len()).unwrap_or(u32::MAX),
+        shift_m: Summary::of(shift_m),
+        longitude_shift_deg: Summary::of(turn_deg),
+    };
     Converted {
-        files: shifts(&converted, &before),
-        footprints: converted,
+        files: shifts.iter().map(conversion).collect(),
+        footprints,
         notes,
     }
 }
 
-/// The footprints, with every shot converted from its file's datum.
-fn turned(footprints: Footprints<AsRead>, clock: &MolaClock) -> Footprints<BodyFixed> {
+/// Rows that are converted at once.
+const ROWS_AT_ONCE: usize = 1 << 16;
+
+/// The shift of a footprint by a conversion.
+#[derive(Debug, Clone, Copy, Default)]
+struct Shift {
+    /// Distance on the ground, metres.
+    ground_m: f64,
+    /// Change of east longitude, radians.
+    turn_rad: f64,
+}
+
+impl Shift {
+    /// From the shot to its place on the ground after the conversion.
+    fn of(shot: &Footprint, (longitude_rad, latitude_rad): (f64, f64)) -> Self {
+        let here = spherical_to_xyz_m(shot.longitude_rad, shot.latitude_rad, shot.radius_m);
+        let there = spherical_to_xyz_m(longitude_rad, latitude_rad, shot.radius_m);
+        Self {
+            ground_m: (there - here).norm(),
+            turn_rad: wrap_pi(longitude_rad - shot.longitude_rad),
+        }
+    }
+}
+
+/// The footprints, with every shot converted from its file's datum; `hear` receives the file and the shift of every shot.
+fn turned(
+    footprints: Footprints<AsRead>,
+    clock: &MolaClock,
+    mut hear: impl FnMut(usize, Shift),
+) -> Footprints<BodyFixed> {
     let datums = footprints.files.iter();
     let datums: Vec<DatumTurn> = datums
         .map(|file| DatumTurn::new(file.datum, clock))
         .collect();
     let mut converted = footprints.declare::<BodyFixed>();
-    if datums.iter().all(DatumTurn::is_none) {
-        return converted;
-    }
-    let moved: Vec<Option<[(f64, f64); 2]>> = (0..converted.len())
-        .into_par_iter()
-        .map(|row| {
+    let rows = converted.len();
+    for start in (0..rows).step_by(ROWS_AT_ONCE) {
+        let rows = start..rows.min(start + ROWS_AT_ONCE);
+        let moved = rows.clone().into_par_iter().map(|row| {
             let shot = converted.row(row);
-            datums[usize::from(shot.file)].moved(&shot)
-        })
-        .collect();
-    for (row, moved) in moved.into_iter().enumerate() {
-        if let Some([ground, spacecraft]) = moved {
-            (converted.longitude_rad[row], converted.latitude_rad[row]) = ground;
-            (
-                converted.spacecraft_longitude_rad[row],
-                converted.spacecraft_latitude_rad[row],
-            ) = spacecraft;
+            let moved = datums[usize::from(shot.file)].moved(&shot)?;
+            Some((moved, Shift::of(&shot, moved[0])))
+        });
+        let moved: Vec<Option<([(f64, f64); 2], Shift)>> = moved.collect();
+        for (row, moved) in rows.zip(moved) {
+            let shift = moved.map_or_else(Shift::default, |([ground, spacecraft], shift)| {
+                (converted.longitude_rad[row], converted.latitude_rad[row]) = ground;
+                (
+                    converted.spacecraft_longitude_rad[row],
+                    converted.spacecraft_latitude_rad[row],
+                ) = spacecraft;
+                shift
+            });
+            hear(usize::from(converted.file[row]), shift);
         }
     }
     converted
@@ -206,11 +272,11 @@ impl DatumTurn {
             return None;
         }
         let out_at = Et::from_seconds(shot.et_tag_s);
+        let conversion =
+            DatumConversion::of(self.body, self.datum, out_at, out_at.plus(self.turn_s));
         let move_direction = |longitude_rad, latitude_rad| {
             let direction = spherical_to_xyz_m(longitude_rad, latitude_rad, 1.0);
-            let into_at = out_at.plus(self.turn_s);
-            let there = convert_vector(self.body, direction, self.datum, out_at, into_at);
-            let there = Spherical::from_xyz_m(&there.xyz_m);
+            let there = Spherical::from_xyz_m(&conversion.apply(&direction).xyz_m);
             (there.longitude_rad, there.latitude.0)
         };
         Some([
@@ -235,28 +301,7 @@ pub fn convert_at_tags(
         scope: BiasScope::None,
         source: String::new(),
     };
-    turned(footprints, &at_tags)
-}
-
-/// Shifts of the shots of each file from longitudes and latitudes `before`.
-fn shifts(after: &Footprints<BodyFixed>, before: &[Vec<f64>; 2]) -> Vec<FileConversion> {
-    let mut moved = vec![(Vec::new(), Vec::new()); after.files.len()];
-    let [longitude_rad, latitude_rad] = before;
-    for row in 0..after.len() {
-        let shot = after.row(row);
-        let there = spherical_to_xyz_m(shot.longitude_rad, shot.latitude_rad, shot.radius_m);
-        let here = spherical_to_xyz_m(longitude_rad[row], latitude_rad[row], shot.radius_m);
-        let turn_rad = wrap_pi(shot.longitude_rad - longitude_rad[row]);
-        let (shift_m, turn_deg) = &mut moved[usize::from(shot.file)];
-        shift_m.push((there - here).norm());
-        turn_deg.push(turn_rad / RADIANS_PER_DEGREE);
-    }
-    let summaries = moved.iter().map(|(shift_m, turn_deg)| FileConversion {
-        shots: u32::try_from(shift_m.len()).unwrap_or(u32::MAX),
-        shift_m: Summary::of(shift_m),
-        longitude_shift_deg: Summary::of(turn_deg),
-    });
-    summaries.collect()
+    turned(footprints, &at_tags, |_, _| {})
 }
 
 fn note(body: Body, name: &str, datum: Datum, turn_s: Option<f64>) -> String {

@@ -32,6 +32,7 @@ pub struct Profile {
     /// Orbit number in the PEDR.
     pub orbit: u32,
     /// Rows of the footprints, counted from 0.
+    #[serde(with = "areograph_base::packed")]
     pub rows: Vec<u32>,
     /// First and last corrected shot time.
     pub interval: Interval,

@@ -2,10 +2,14 @@
 
 use std::sync::atomic::AtomicBool;
 
+use serde::{Deserialize, Serialize};
+
 use super::convert_datum::Converted;
 use areograph_base::{
     error::{Result, Stopped},
+    packed,
     time::Et,
+    utc::Utc,
 };
 use areograph_spice::{KernelView, UtcClock};
 use areograph_store::{
@@ -23,14 +27,18 @@ stage_inputs! {
     }
 }
 
-/// One string per footprint: ISO 8601 without a zone letter.
+/// UTC of the corrected time of every footprint, in their order.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct ShotTimes(#[serde(with = "packed")] pub Vec<Utc>);
+
 impl Stage for TagUtc<'_> {
     const NAME: &'static str = "tag_utc";
-    const METHOD: u32 = 3;
-    type Output = Vec<String>;
+    const METHOD: u32 = 4;
+    type Output = ShotTimes;
     stage_inputs!(fingerprint);
 
-    fn run(&self, stop: &AtomicBool) -> Result<Vec<String>> {
+    fn run(&self, stop: &AtomicBool) -> Result<ShotTimes> {
         let session = self.kernels.session()?;
         let instants = self.converted.value()?.footprints.et_s.iter();
         if let Some(last_s) = instants.clone().copied().reduce(f64::max) {
@@ -41,6 +49,6 @@ impl Stage for TagUtc<'_> {
             Stopped::check(stop)?;
             clock.utc(Et::from_seconds(*et_s))
         });
-        utc.collect()
+        Ok(ShotTimes(utc.collect::<Result<_>>()?))
     }
 }

@@ -136,15 +136,18 @@ impl Book {
         Ok(())
     }
 
-    /// Replaces every output of this type by what `change` returns for its index and value; `None` keeps it.
+    /// Replaces the outputs of this type and round by what `change` returns for their indices and values; `None` keeps
+    /// one.
     ///
     /// # Errors
     /// An output whose value is not known or cannot be read.
-    pub fn change<T: Entered>(&mut self, change: impl Fn(usize, &T) -> Option<T>) -> Result<()> {
-        for ((name, _), entry) in &mut self.entries {
-            if name == type_name::<T>() {
-                *entry = entry.changed(&change)?;
-            }
+    pub fn change<T: Entered>(
+        &mut self,
+        round: Round,
+        change: impl Fn(usize, &T) -> Option<T>,
+    ) -> Result<()> {
+        if let Some(entry) = self.entries.get_mut(&key::<T>(round)) {
+            *entry = entry.changed(change)?;
         }
         Ok(())
     }
@@ -361,11 +364,15 @@ mod tests {
     }
 
     #[test]
-    fn outputs_are_changed_and_left_out_in_every_round() {
+    fn outputs_are_changed_in_a_round_and_left_out_in_all() {
         let whole = book();
         let mut page = whole.clone();
-        page.change(|index, value: &u32| (index == 1).then_some(value + 10))
+        for round in [Round::Adjusted, Round::Matching] {
+            page.change(round, |index, value: &u32| {
+                (index == 1).then_some(value + 10)
+            })
             .unwrap();
+        }
         page.leave_out::<String>();
         assert_eq!(page.parts::<u32>(Round::Adjusted).unwrap(), [&2, &13]);
         assert_eq!(page.find::<String>(Round::Initial).unwrap(), None);

@@ -1,8 +1,7 @@
 //! Crossovers: places where two profiles measured the same ground.
 
-use std::collections::BTreeMap;
-
 use nalgebra::{Matrix2, Vector2, Vector3};
+use rayon::prelude::*;
 
 use super::{
     Placed, Plan, SharedErrors, SurfaceOptions, SurfaceShot, Variogram,
@@ -54,32 +53,37 @@ pub fn crossovers(shots: &[SurfaceShot], options: &SurfaceOptions) -> Vec<Crosso
     let model = options.body.model();
     let plan = Plan::around(model, shots.iter().map(|shot| shot.ground_m));
     let placed: Vec<Placed> = shots
-        .iter()
+        .par_iter()
         .map(|shot| Placed::new(model, &plan, shot, options.profile_sigma_m))
         .collect();
     let segments = segments(&placed, options.shot_sigma_m);
-    let mut cells: BTreeMap<[i64; 2], Vec<usize>> = BTreeMap::new();
+    // Every segment in the cells that it touches, cell by cell.
+    let mut entries: Vec<([i64; 2], usize)> = Vec::with_capacity(segments.len());
     for (index, segment) in segments.iter().enumerate() {
         let [one, other] = [cell(&segment.from.plan_m), cell(&segment.to.plan_m)];
         for east in one[0].min(other[0])..=one[0].max(other[0]) {
             for north in one[1].min(other[1])..=one[1].max(other[1]) {
-                cells.entry([east, north]).or_default().push(index);
+                entries.push(([east, north], index));
             }
         }
     }
-    let mut found = Vec::new();
-    for (of_cell, inside) in &cells {
-        for (position, first) in inside.iter().enumerate() {
-            for second in &inside[position + 1..] {
+    entries.par_sort_unstable();
+    let cells: Vec<&[([i64; 2], usize)]> = entries.chunk_by(|one, next| one.0 == next.0).collect();
+    let of_cell = |inside: &&[([i64; 2], usize)]| {
+        let mut found = Vec::new();
+        for (position, (own, first)) in inside.iter().enumerate() {
+            for (_, second) in &inside[position + 1..] {
                 let (first, second) = (&segments[*first], &segments[*second]);
                 if let Some((shares, place)) = crossing(first, second)
-                    && cell(&place) == *of_cell
+                    && cell(&place) == *own
                 {
                     found.push(crossover(shots, [first, second], shares, options));
                 }
             }
         }
-    }
+        found
+    };
+    let mut found: Vec<Crossover> = cells.par_iter().flat_map_iter(of_cell).collect();
     found.sort_by(|one, other| {
         let by_place = one.place_m.z.total_cmp(&other.place_m.z);
         one.profiles.cmp(&other.profiles).then(by_place)

@@ -32,7 +32,7 @@ pub struct ControlNetwork<'a> {
     /// Description.
     pub description: String,
     /// UTC given as its creation, ISO 8601.
-    pub created_utc: &'a str,
+    pub created_utc: String,
     /// Its points.
     pub points: Vec<NetworkPoint<'a>>,
 }
@@ -167,8 +167,8 @@ fn text(network: &ControlNetwork) -> std::result::Result<String, ProductError> {
     lines.key("NetworkId", &quoted(network.id)?);
     lines.key("TargetName", &network.body.names().name);
     lines.key("UserName", "areograph");
-    lines.key("Created", network.created_utc);
-    lines.key("LastModified", network.created_utc);
+    lines.key("Created", &network.created_utc);
+    lines.key("LastModified", &network.created_utc);
     lines.key("Description", &quoted(&network.description)?);
     lines.key("Version", "5");
     for point in &network.points {

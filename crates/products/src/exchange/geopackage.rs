@@ -119,7 +119,12 @@ fn value(values: &Values, row: usize) -> Value {
         Values::Natural(of) => Value::Integer(of[row].into()),
         Values::Integer(of) => Value::Integer(of[row].into()),
         Values::Flag(of) => Value::Integer(of[row].into()),
-        Values::Time(of) => Value::Text(of[row].to_milliseconds()),
+        Values::Time(of) => Value::Text(
+            of[row]
+                .calendar()
+                .format("%Y-%m-%dT%H:%M:%S%.3fZ")
+                .to_string(),
+        ),
         Values::Text(of) => Value::Text(of[row].clone()),
         Values::Bytes(of) => Value::Blob(of[row].clone()),
     }

@@ -33,7 +33,7 @@ pub(crate) static NETWORK: Declaration = Declaration {
     content: Content::Foreign,
     write: Write::Adjustment(|path, of, geometric, adjustment| {
         let joined = Joined::new(of.site, geometric, adjustment);
-        let network = joined.network(newest_utc(of.site));
+        let network = joined.network();
         write_control_network(path, &network).map(Some)
     }),
     uses: &[Use {
@@ -86,12 +86,12 @@ pub(crate) static IMAGES: Declaration = Declaration {
 };
 
 /// UTC of the newest shot, or of the first image without shots: a clock would give different bytes each time.
-pub(super) fn newest_utc<'a>(site: &SiteProducts<'a>) -> &'a str {
-    let newest = site.utc.iter().max().map(String::as_str);
+pub(super) fn newest_utc(site: &SiteProducts) -> String {
     let first = site.images.first();
-    newest
-        .or_else(|| first.map(|image| &*image.times.utc_start))
-        .unwrap_or_default()
+    match (site.utc.is_empty(), first) {
+        (true, Some(image)) => image.times.utc_start.clone(),
+        _ => site.newest_utc(),
+    }
 }
 
 /// The tie points of a site with their adjustment.
@@ -181,7 +181,7 @@ impl<'a> Joined<'a> {
         Some([own.reprojection_lines, sense * own.reprojection_px])
     }
 
-    fn network(&'a self, created_utc: &'a str) -> ControlNetwork<'a> {
+    fn network(&'a self) -> ControlNetwork<'a> {
         let point = |(index, tie): (usize, &'a TiePoint)| {
             let found = self.points.get(&index);
             let measures = tie.measures.iter().map(|measure| NetworkMeasure {
@@ -211,7 +211,7 @@ impl<'a> Joined<'a> {
             id: &self.site.config.site,
             body: self.site.config.body,
             description,
-            created_utc,
+            created_utc: newest_utc(self.site),
             points: self.ties.iter().enumerate().map(point).collect(),
         }
     }

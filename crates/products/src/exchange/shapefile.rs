@@ -78,7 +78,7 @@ pub(crate) static ATTRIBUTES: Declaration = part!(
     "attributes of footprints.shp",
     |path, of| {
         let features = features(of.site);
-        write_attributes(path, features.newest_utc, &features.attributes.for_dbase())
+        write_attributes(path, &features.newest_utc, &features.attributes.for_dbase())
     }
 );
 
@@ -184,7 +184,7 @@ enum Cell<'a> {
 /// The values with instants as texts: dBASE has days only.
 fn texts(values: Vec<Values>) -> Vec<Values> {
     let text = |values: Values| match values {
-        Values::Time(times) => Values::Text(times.iter().map(ToString::to_string).collect()),
+        Values::Time(times) => Values::Text(times.iter().map(|utc| format!("{utc}Z")).collect()),
         values => values,
     };
     values.into_iter().map(text).collect()
@@ -339,7 +339,7 @@ mod tests {
     fn a_changed_attribute_is_noticed() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.dbf");
-        write_attributes(&path, example().newest_utc, &table()).unwrap();
+        write_attributes(&path, &example().newest_utc, &table()).unwrap();
         let bytes = fs::read(&path).unwrap();
         assert_eq!(bytes[1..4], [99, 8, 24]);
         // The last written digit of a longitude.
@@ -361,7 +361,7 @@ mod tests {
     #[test]
     fn a_full_disk_is_reported_as_such() {
         let full = Path::new("/dev/full");
-        let failure = write_attributes(full, example().newest_utc, &table()).unwrap_err();
+        let failure = write_attributes(full, &example().newest_utc, &table()).unwrap_err();
         assert_eq!(failure.kind(), FailureKind::Io);
         assert_eq!(failure.file.as_deref(), Some(full));
         assert!(failure.to_string().contains("free some space"), "{failure}");

@@ -156,16 +156,13 @@ fn outline([west, south, east, north]: [f64; 4]) -> Value {
 
 /// First and last UTC of shots and images; `None` without any.
 fn period(site: &SiteProducts) -> Result<Option<[String; 2]>> {
-    let mut instants = Vec::new();
-    for utc in site
+    let shots = site
         .utc
         .iter()
         .min()
         .into_iter()
-        .chain(site.utc.iter().max())
-    {
-        instants.push(instant(utc)?);
-    }
+        .chain(site.utc.iter().max());
+    let mut instants: Vec<NaiveDateTime> = shots.map(|utc| utc.calendar()).collect();
     for image in site.images {
         let start = instant(&image.times.utc_start)?;
         #[allow(

@@ -186,7 +186,7 @@ fn lola_like<'a>() -> Vec<Column<Shot<'a>>> {
             "utc",
             Unit::None,
             "corrected time of the shot, UTC",
-            Shot::utc,
+            |shot: &Shot| shot.utc().to_string(),
         ),
         column(
             "longitude_deg",

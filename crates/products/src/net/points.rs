@@ -69,7 +69,7 @@ fn features<'a>(of: &NetProducts<'a>) -> Features<'a> {
         name: &of.config.net,
         table: "points",
         // A net has no date; the machine's clock would give different bytes each time.
-        newest_utc: "1970-01-01T00:00:00.000",
+        newest_utc: "1970-01-01T00:00:00.000".to_owned(),
         body: Body::Mars,
         frame: "Mars body-fixed, areocentric latitude, east longitude, in the frame of the controls",
         z: "z: 0, because a plane triangulation has no heights".to_owned(),

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use ::parquet::arrow::{ProjectionMask, arrow_reader::ParquetRecordBatchReaderBuilder};
-use arrow_array::{Array as _, Float64Array, RecordBatch, StringArray, UInt32Array};
+use arrow_array::{Array as _, BooleanArray, Float64Array, RecordBatch, StringArray, UInt32Array};
 
 use super::ReadError;
 use crate::files::open;
@@ -117,6 +117,14 @@ impl Batch {
         name: &'static str,
     ) -> std::result::Result<&UInt32Array, ReadError> {
         self.column(name, "32-bit unsigned integer", false)
+    }
+
+    /// A column of yes and no.
+    pub(super) fn flags(
+        &self,
+        name: &'static str,
+    ) -> std::result::Result<&BooleanArray, ReadError> {
+        self.column(name, "yes or no", false)
     }
 
     /// A column of texts.

@@ -6,6 +6,7 @@ mod columns;
 mod documents;
 mod footprints;
 mod orientation;
+mod shots;
 mod ties;
 
 pub use documents::{
@@ -14,6 +15,7 @@ pub use documents::{
 };
 pub use footprints::{FootprintRows, read_footprints};
 pub use orientation::{SampleRow, read_samples};
+pub(crate) use shots::{read_points, read_residuals};
 pub use ties::read_adjusted_ties;
 
 use areograph_base::error::Cause;

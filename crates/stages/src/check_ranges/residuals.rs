@@ -8,22 +8,31 @@ use areograph_geom::range_residuals::RangeResiduals;
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct ShotResiduals {
     /// Index of the profile.
+    #[serde(with = "areograph_base::packed")]
     pub profile: Vec<u32>,
     /// Row of the footprint.
+    #[serde(with = "areograph_base::packed")]
     pub row: Vec<u32>,
     /// Range − |SPK spacecraft − raw footprint|.
+    #[serde(with = "areograph_base::packed")]
     pub range_minus_distance_m: Vec<f64>,
     /// Range − |SPK spacecraft − crossover-corrected footprint|.
+    #[serde(with = "areograph_base::packed")]
     pub range_minus_distance_crossover_m: Vec<f64>,
     /// Range − |PEDR spacecraft − raw footprint|; NaN, as below, for shots of tables without a spacecraft.
+    #[serde(with = "areograph_base::packed")]
     pub decoding_m: Vec<f64>,
     /// PEDR spacecraft − SPK spacecraft, away from Mars.
+    #[serde(with = "areograph_base::packed")]
     pub spacecraft_radial_m: Vec<f64>,
     /// PEDR spacecraft − SPK spacecraft, along the flight.
+    #[serde(with = "areograph_base::packed")]
     pub spacecraft_along_m: Vec<f64>,
     /// PEDR spacecraft − SPK spacecraft, along the orbit's angular momentum.
+    #[serde(with = "areograph_base::packed")]
     pub spacecraft_cross_m: Vec<f64>,
     /// Whether range − distance is an outlier of its profile.
+    #[serde(with = "areograph_base::packed")]
     pub outlier: Vec<bool>,
 }
 

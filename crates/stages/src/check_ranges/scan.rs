@@ -30,11 +30,8 @@ use areograph_spice::Trajectory;
 /// Fewest shots for a meaningful scan.
 const SHOTS_MIN: usize = 10;
 
-/// Corrections at which the residual of every shot is computed.
-const NODES: usize = 7;
-
-/// Largest half width of a scan whose residuals are interpolated, seconds.
-const NARROW_S: f64 = 2.0;
+/// Half widths of scans whose residuals are interpolated, seconds: by five and by seven residuals of every shot.
+const NARROW_S: [f64; 2] = [0.5, 2.0];
 
 /// Half the time over which the rate of a line of sight is measured, seconds.
 const RATE_STEP_S: f64 = 0.01;
@@ -98,8 +95,14 @@ impl BiasScan {
         let [mut raw, mut crossover] =
             [ScannedRadius::Raw, ScannedRadius::Crossover].map(Self::empty);
         let corrections: Vec<f64> = corrections(limits).collect();
-        let spreads_m = interpolated_spreads_m(&sighted, trajectory, &corrections)
-            .unwrap_or_else(|| spreads_m(&sighted, trajectory, &corrections));
+        let half_width_s = corrections.last().copied().unwrap_or(0.0);
+        let interpolated = match NARROW_S.map(|narrow_s| half_width_s <= narrow_s) {
+            [true, _] => interpolated_spreads_m::<5>(&sighted, trajectory, &corrections),
+            [_, true] => interpolated_spreads_m::<7>(&sighted, trajectory, &corrections),
+            _ => None,
+        };
+        let spreads_m =
+            interpolated.unwrap_or_else(|| spreads_m(&sighted, trajectory, &corrections));
         for (correction_s, spreads_m) in corrections.into_iter().zip(spreads_m) {
             // Corrections beyond the coverage of the kernels are omitted.
             for (scan, spread_m) in [&mut raw, &mut crossover]
@@ -115,7 +118,7 @@ impl BiasScan {
         scan.best_s = best_s(&scan);
         scan.uncertainty_s = scan
             .best_s
-            .and_then(|best_s| uncertainty_s(shots, scan.radius, trajectory, best_s));
+            .and_then(|best_s| uncertainty_s(shots, &sighted, scan.radius, trajectory, best_s));
         Some(scan)
     }
 
@@ -155,19 +158,19 @@ fn spreads_m(sighted: &[Sighted], trajectory: &Trajectory, corrections: &[f64]) 
     corrections.par_iter().map(spread_m).collect()
 }
 
-/// Spreads from residuals at [`NODES`] corrections: as a function of the correction, the residual of a shot is a
+/// Spreads from residuals at `NODES` corrections: as a function of the correction, the residual of a shot is a
 /// polynomial, and the variance of residuals at any correction follows from their covariances at the nodes.
 ///
-/// The line of sight turns by `v c / R`, at most 0.06 radians within [`NARROW_S`] (4.7 km/s at a range of 170 km, the lowest
-/// periapsis): the remainder of degree 7 is below 1e-5 m.
-/// `None` for a wide scan, one of few steps, or kernels that do not cover every node.
-fn interpolated_spreads_m(
+/// The line of sight turns by `v c / R`, at most 0.014 and 0.06 radians within [`NARROW_S`] (4.7 km/s at a range of 170 km,
+/// the lowest periapsis): the remainders of degree 5 and 7 are below 1e-5 m.
+/// `None` for a scan of few steps, or kernels that do not cover every node.
+fn interpolated_spreads_m<const NODES: usize>(
     sighted: &[Sighted],
     trajectory: &Trajectory,
     corrections: &[f64],
 ) -> Option<Spreads> {
     let half_width_s = corrections.last().copied()?;
-    if corrections.len() <= NODES || half_width_s > NARROW_S {
+    if corrections.len() <= NODES {
         return None;
     }
     let nodes_s: [f64; NODES] = std::array::from_fn(|node| {
@@ -185,7 +188,7 @@ fn interpolated_spreads_m(
     };
     let residuals_m: Option<Vec<[[f64; NODES]; 2]>> = sighted.par_iter().map(at_nodes).collect();
     let residuals_m = residuals_m?;
-    let covariances_m2 = [0, 1].map(|which| covariance_m2(&residuals_m, which));
+    let covariances_m2 = [0, 1].map(|which| covariance_m2::<NODES>(&residuals_m, which));
     let at = |correction_s: &f64| {
         let weights = SVector::from(lagrange_weights(&nodes_s, *correction_s));
         let spread_m = |covariance_m2: &SMatrix<f64, NODES, NODES>| {
@@ -203,7 +206,10 @@ fn interpolated_spreads_m(
 }
 
 /// Sample covariance of the residuals at the nodes.
-fn covariance_m2(residuals_m: &[[[f64; NODES]; 2]], which: usize) -> SMatrix<f64, NODES, NODES> {
+fn covariance_m2<const NODES: usize>(
+    residuals_m: &[[[f64; NODES]; 2]],
+    which: usize,
+) -> SMatrix<f64, NODES, NODES> {
     let of_shots = || residuals_m.iter().map(|of| SVector::from(of[which]));
     let mean = of_shots().sum::<SVector<f64, NODES>>() / residuals_m.len() as f64;
     let products = of_shots().map(|residuals| {
@@ -214,7 +220,7 @@ fn covariance_m2(residuals_m: &[[[f64; NODES]; 2]], which: usize) -> SMatrix<f64
 }
 
 /// Factors of the values at `nodes` in the value of their polynomial at `at`.
-fn lagrange_weights(nodes: &[f64; NODES], at: f64) -> [f64; NODES] {
+fn lagrange_weights<const NODES: usize>(nodes: &[f64; NODES], at: f64) -> [f64; NODES] {
     std::array::from_fn(|own| {
         let others = nodes.iter().enumerate().filter(|(other, _)| *other != own);
         others
@@ -267,29 +273,6 @@ impl Sighted {
     }
 }
 
-/// Range − distance of a shot whose tag is corrected by `correction_s`.
-fn residual_m(
-    shot: &Footprint,
-    radius: ScannedRadius,
-    trajectory: &Trajectory,
-    correction_s: f64,
-) -> Option<f64> {
-    let at = Et::from_seconds(shot.et_tag_s + correction_s);
-    let spacecraft = body_rotation(Body::Mars, at).apply(&trajectory.position(at)?);
-    Some(range_residual_m(
-        shot.range_m,
-        &spacecraft,
-        &footprint(shot, radius_m(shot, radius)),
-    ))
-}
-
-fn radius_m(shot: &Footprint, radius: ScannedRadius) -> f64 {
-    match radius {
-        ScannedRadius::Raw => shot.radius_m,
-        ScannedRadius::Crossover => shot.radius_crossover_m,
-    }
-}
-
 /// Corrections from `-half_width` to `+half_width`, symmetric about zero.
 fn corrections(limits: &RangeCheckConfig) -> impl Iterator<Item = f64> {
     let (half_width_s, step_s) = (limits.scan_half_width_s, limits.scan_step_s);
@@ -338,36 +321,41 @@ fn track_axes(position: &Vector3<f64>, velocity: &Vector3<f64>) -> Matrix3<f64> 
 /// a metre per second, would otherwise attribute a slope of millimetres per second to the clock.
 fn uncertainty_s(
     shots: &[Footprint],
+    sighted: &[Sighted],
     radius: ScannedRadius,
     trajectory: &Trajectory,
     best_s: f64,
 ) -> Option<f64> {
+    let corrections_s = [best_s - RATE_STEP_S, best_s, best_s + RATE_STEP_S];
+    let turns = corrections_s.map(turn);
+    let which = radius as usize;
     let mut residuals_m = Vec::with_capacity(shots.len());
     let mut rates_m_s = Vec::with_capacity(shots.len());
     let mut directions: [Vec<f64>; 3] = std::array::from_fn(|_| Vec::with_capacity(shots.len()));
     let mut orbit_difference_m = Vector3::zeros();
     let mut sighted_differences_m = Vec::with_capacity(shots.len());
-    for shot in shots {
-        let residual = |correction_s| residual_m(shot, radius, trajectory, correction_s);
-        let change_m = residual(best_s + RATE_STEP_S)? - residual(best_s - RATE_STEP_S)?;
-        residuals_m.push(residual(best_s)?);
+    for (shot, sighted) in shots.iter().zip(sighted) {
+        let residual = |step: usize| {
+            let residuals = sighted.residuals_m(trajectory, corrections_s[step], &turns[step]);
+            residuals.map(|of| of[which])
+        };
+        let change_m = residual(2)? - residual(0)?;
+        residuals_m.push(residual(1)?);
         rates_m_s.push(change_m / (2.0 * RATE_STEP_S));
-        let at = Et::from_seconds(shot.et_tag_s + best_s);
-        let position = trajectory.position(at)?;
-        let to_mars = body_rotation(Body::Mars, at);
-        let to_track = track_axes(&position.xyz_m, &trajectory.velocity_m_s(at)?).transpose()
-            * to_mars.matrix().transpose();
-        let spacecraft = to_mars.apply(&position);
-        let ground_m = footprint(shot, radius_m(shot, radius)).xyz_m;
-        let sight = (spacecraft.xyz_m - ground_m).normalize();
+        let (position, velocity_m_s) = trajectory.state(sighted.tag.plus(best_s))?;
+        let to_mars = turns[1] * sighted.to_mars;
+        let to_track = track_axes(&position.xyz_m, &velocity_m_s).transpose() * to_mars.transpose();
+        let spacecraft_m = to_mars * position.xyz_m;
+        let ground_m = sighted.footprints[which].xyz_m;
+        let sight = (spacecraft_m - ground_m).normalize();
         let direction = to_track * sight;
         for (axis, component) in directions.iter_mut().zip(&direction) {
             axis.push(*component);
         }
-        let difference_m = to_track * (own_spacecraft(shot).xyz_m - spacecraft.xyz_m);
+        let difference_m = to_track * (own_spacecraft(shot).xyz_m - spacecraft_m);
         orbit_difference_m += difference_m;
         // The range belongs to the spacecraft of the file and the raw radius.
-        let corrected_m = ground_m - footprint(shot, shot.radius_m).xyz_m;
+        let corrected_m = ground_m - sighted.footprints[0].xyz_m;
         sighted_differences_m
             .push(difference_m.yz().dot(&direction.yz()) + corrected_m.dot(&sight));
     }

@@ -59,10 +59,16 @@ impl ImageRegistration {
     /// The registration without its points.
     #[must_use]
     pub fn without_points(&self) -> Self {
+        self.with_points(RegisteredPoints::default())
+    }
+
+    /// The registration with these points instead of its own.
+    #[must_use]
+    pub fn with_points(&self, points: RegisteredPoints) -> Self {
         Self {
             image: self.image.clone(),
             model: self.model,
-            points: RegisteredPoints::default(),
+            points,
             rejected: self.rejected.clone(),
             profiles: self.profiles.clone(),
             methods: self.methods.clone(),

@@ -15,14 +15,18 @@ macro_rules! columns {
         #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
         pub struct RegisteredPoints {
             /// Index of the profile.
+            #[serde(with = "areograph_base::packed")]
             pub profile: Vec<u32>,
             /// Row of the footprint.
+            #[serde(with = "areograph_base::packed")]
             pub row: Vec<u32>,
-            $($(#[$doc])* pub $column: Vec<$kind>,)*
+            $($(#[$doc])* #[serde(with = "areograph_base::packed")] pub $column: Vec<$kind>,)*
             /// Evaluations of the frame-first iteration with the second-order model; 0 where it was not
             /// tried (outside the image's lines) or does not converge.
+            #[serde(with = "areograph_base::packed")]
             pub evaluations_frame_first: Vec<u32>,
             /// Evaluations of the fixed-point iteration, eq. 4 of Shan et al. 2005; 0 in the same cases.
+            #[serde(with = "areograph_base::packed")]
             pub evaluations_fixed_point: Vec<u32>,
         }
 

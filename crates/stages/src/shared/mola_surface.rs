@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use nalgebra::Vector3;
+use rayon::prelude::*;
 
 use crate::group_profiles::Profile;
 use areograph_base::{altimetry::NO_ATTITUDE, footprints::Footprints, frames::BodyFixed};
@@ -92,24 +93,26 @@ impl MolaShots {
     }
 
     fn all(footprints: &Footprints<BodyFixed>, profiles: &[Profile]) -> Vec<SurfaceShot> {
-        let mut used = BTreeSet::new();
-        let mut shots = Vec::new();
+        let mut is_used = vec![false; footprints.len()];
+        let mut used = Vec::new();
         for (index, profile) in profiles.iter().enumerate() {
-            for row in profile.rows.iter().filter(|row| used.insert(**row)) {
-                let at = *row as usize;
-                shots.push(SurfaceShot {
-                    ground_m: spherical_to_xyz_m(
-                        footprints.longitude_rad[at],
-                        footprints.latitude_rad[at],
-                        footprints.ground_radius_m(at),
-                    ),
-                    profile: index,
-                    attitude_known: footprints.attitude_flag[at] < NO_ATTITUDE,
-                    off_nadir_rad: footprints.off_nadir_rad[at],
-                });
+            for at in profile.rows.iter().map(|row| *row as usize) {
+                if !std::mem::replace(&mut is_used[at], true) {
+                    used.push((index, at));
+                }
             }
         }
-        shots
+        let shot = |(profile, at): (usize, usize)| SurfaceShot {
+            ground_m: spherical_to_xyz_m(
+                footprints.longitude_rad[at],
+                footprints.latitude_rad[at],
+                footprints.ground_radius_m(at),
+            ),
+            profile,
+            attitude_known: footprints.attitude_flag[at] < NO_ATTITUDE,
+            off_nadir_rad: footprints.off_nadir_rad[at],
+        };
+        used.into_par_iter().map(shot).collect()
     }
 
     /// `options` with the radial error of profiles from crossovers.
