@@ -40,9 +40,11 @@ use areograph::{
             Orientation, OrientationSample, OtherConvention,
         },
         tag_times::{ImageTimes, StartFrom},
+        tag_utc::ShotTimes,
     },
     store::book::{Book, Entered},
     time::{Et, Interval, Intervals},
+    utc::Utc,
 };
 use nalgebra::{Matrix3, Vector3};
 
@@ -60,7 +62,7 @@ pub(crate) struct Site {
     pub(crate) orientation: Orientation,
     pub(crate) model: SensorModel,
     pub(crate) footprints: Footprints<BodyFixed>,
-    pub(crate) utc: Vec<String>,
+    pub(crate) utc: Vec<Utc>,
     pub(crate) profiles: Vec<Profile>,
     pub(crate) ranges: RangeCheck,
     pub(crate) registration: ImageRegistration,
@@ -113,7 +115,10 @@ impl Site {
             model,
             registration,
             utc: (0..footprints.len())
-                .map(|row| format!("1999-08-24T14:12:{:06.3}", 13.0 + 0.1 * row as f64))
+                .map(|row| {
+                    let utc = format!("1999-08-24T14:12:{:06.3}", 13.0 + 0.1 * row as f64);
+                    Utc::parse(&utc).unwrap()
+                })
                 .collect(),
             ranges: ranges(&profiles),
             rejected: BTreeMap::from([("class 0 <cloud>".to_owned(), 7)]),
@@ -259,7 +264,8 @@ impl Site {
             notes: Vec::new(),
         };
         book.enter_value("convert_datum", converted).unwrap();
-        book.enter_value("tag_utc", self.utc.clone()).unwrap();
+        book.enter_value("tag_utc", ShotTimes(self.utc.clone()))
+            .unwrap();
         book.enter_value("group_profiles", self.profiles.clone())
             .unwrap();
         book.enter_value("check_profiles", profile_check).unwrap();

@@ -22,6 +22,7 @@ use areograph::{
     store::manifest::Manifest,
     time::Et,
     units::{RADIANS_PER_DEGREE, SECONDS_PER_DAY},
+    utc::Utc,
 };
 use arrow_array::RecordBatch;
 use arrow_array::cast::AsArray;
@@ -266,7 +267,8 @@ fn a_long_table_comes_back_in_pieces() {
     let shot = Site::small().footprints.row(0);
     for record in 0..ROWS {
         site.footprints.push(&Footprint { record, ..shot });
-        site.utc.push("1999-08-24T14:12:13.000".to_owned());
+        site.utc
+            .push(Utc::parse("1999-08-24T14:12:13.000").unwrap());
     }
     let (folder, products) = written("long", &site, false);
     assert_eq!(
@@ -419,7 +421,7 @@ fn exchange_files_have_the_columns_that_isis_and_asp_read() {
     let (folder, _) = written("exchange", &Site::small(), true);
     let lola = fs::read_to_string(folder.join("exchange/lola_like.csv")).unwrap();
     let fields: Vec<&str> = lola.lines().nth(1).unwrap().split(',').collect();
-    assert_eq!(fields[0], "1999-08-24T14:12:13.000");
+    assert_eq!(fields[0], "1999-08-24T14:12:13.000000");
     assert!(fields[1].starts_with("179.997135")); // east longitude, degrees
     assert_eq!(&fields[3..5], ["3394.001370", "380.000100"]);
     let ode = fs::read_to_string(folder.join("exchange/ode_pts.csv")).unwrap();
@@ -524,6 +526,6 @@ fn parts_that_do_not_belong_together_are_refused() {
         .unwrap_err();
     assert_eq!(
         failure.cause.to_string(),
-        "UTC strings of footprints: 59; expected 60"
+        "UTC of footprints: 59; expected 60"
     );
 }

@@ -236,3 +236,49 @@ fn compare(
     }
     require_rows(row, range.end)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::table::{Column, Unit, column};
+
+    /// Two columns of these rows: a number that may be missing, and a text.
+    fn table(rows: Vec<(Option<f64>, &'static str)>) -> Table<'static> {
+        let columns: Vec<Column<(Option<f64>, &str)>> = vec![
+            column("a_m", Unit::Metre, "", |row: &(Option<f64>, &str)| row.0),
+            column("name", Unit::None, "", |row: &(Option<f64>, &str)| {
+                row.1.to_owned()
+            }),
+        ];
+        Table::new(columns, rows)
+    }
+
+    #[test]
+    fn a_file_of_other_values_is_not_the_table() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("rows.parquet");
+        let rows = |name| vec![(Some(0.0), "ab"), (None, "c"), (Some(-0.0), name)];
+        assert_eq!(write(&path, &table(rows("d")), Vec::new()).unwrap(), 3);
+        let refused = |rows: Vec<(Option<f64>, &'static str)>| {
+            let expected = table(rows);
+            let digests = encode(Vec::new(), &expected, Vec::new()).unwrap();
+            read_back(&path, &expected, &digests)
+                .unwrap_err()
+                .to_string()
+        };
+        let of_column = |name: &str, failure: String| {
+            let expected = format!("column {name}, from row 1");
+            assert!(failure.contains(&expected), "{failure}");
+        };
+        of_column("name", refused(rows("e")));
+        // The same letters, divided differently.
+        let divided = vec![(Some(0.0), "a"), (None, "bc"), (Some(-0.0), "d")];
+        of_column("name", refused(divided));
+        let present = vec![(Some(0.0), "ab"), (Some(0.0), "c"), (Some(-0.0), "d")];
+        of_column("a_m", refused(present));
+        let sign = vec![(Some(0.0), "ab"), (None, "c"), (Some(0.0), "d")];
+        of_column("a_m", refused(sign));
+        let fewer = refused(rows("d")[..2].to_vec());
+        assert!(fewer.contains("3 rows of 2"), "{fewer}");
+    }
+}

@@ -85,7 +85,7 @@ impl Input for FoundShots {
 
 impl Stage for ConvertDatum<'_> {
     const NAME: &'static str = "convert_datum";
-    const METHOD: u32 = 4;
+    const METHOD: u32 = 5;
     const CHECKED: bool = true;
     type Output = Converted;
     stage_inputs!(fingerprint);

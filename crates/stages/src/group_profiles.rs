@@ -86,7 +86,7 @@ stage_inputs! {
 
 impl Stage for GroupProfiles<'_> {
     const NAME: &'static str = "group_profiles";
-    const METHOD: u32 = 2;
+    const METHOD: u32 = 3;
     const CHECKED: bool = true;
     type Output = Vec<Profile>;
     stage_inputs!(fingerprint);

@@ -24,6 +24,7 @@ use areograph::{
         tag_times::ImageTimes,
     },
     store::book::Book,
+    utc::Utc,
 };
 use serde::de::DeserializeOwned;
 
@@ -138,7 +139,7 @@ impl Site {
             images: &images,
             conversions: &self.converted.files,
             footprints: &self.converted.footprints,
-            utc: &vec![String::new(); self.converted.footprints.len()],
+            utc: &vec![Utc::from_microseconds(0); self.converted.footprints.len()],
             profiles: &self.profiles,
             profile_check: &self.profile_check,
             ranges: &self.ranges,

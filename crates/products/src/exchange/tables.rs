@@ -176,7 +176,8 @@ pub(crate) fn schema() -> DocumentSchema {
 }
 
 fn table<'a>(site: &'a SiteProducts<'a>, columns: Vec<Column<Shot<'a>>>) -> Table<'a> {
-    Table::new(columns, Shot::all(site)).in_terms(&site.config.terms())
+    let shot = |row| Shot::of(site, row);
+    Table::of(columns, site.footprints.len(), shot).in_terms(&site.config.terms())
 }
 
 /// Columns 1 to 5, in the order that ISIS `lrolola2isis` reads.

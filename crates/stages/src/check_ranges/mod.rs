@@ -75,7 +75,7 @@ stage_inputs! {
 
 impl Stage for CheckRanges<'_> {
     const NAME: &'static str = "check_ranges";
-    const METHOD: u32 = 14;
+    const METHOD: u32 = 15;
     type Output = RangeCheck;
     stage_inputs!(fingerprint);
 

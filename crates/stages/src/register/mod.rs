@@ -128,6 +128,7 @@ stage_inputs! {
 
 impl Stage for Register<'_> {
     const NAME: &'static str = "register";
+    const METHOD: u32 = 2;
     type Output = ImageRegistration;
     stage_inputs!(fingerprint);
 
