@@ -28,7 +28,7 @@ use areograph_base::{
 };
 
 /// Largest output that is read at once, bytes: a larger one is read on demand.
-const READ_AT_ONCE: u64 = 1 << 20;
+const READ_AT_ONCE: u64 = 1 << 16;
 /// Bytes of a file that usually contain its header.
 const HEAD_BYTES: u64 = 1 << 16;
 
