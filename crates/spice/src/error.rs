@@ -31,10 +31,10 @@ pub enum SpiceError {
     #[error("a SPICE session is already open on this thread")]
     #[cause(Bug: "report this: a stage opened a second session")]
     SessionOpen,
-    /// A date that the calendar of tables does not have.
-    #[error("UTC {0} is not a date of tables; expected a year from 0 to 9999")]
-    #[cause("correct the times of the shots")]
-    NoCalendar(String),
+    /// CSPICE has written a date in another form than it documents.
+    #[error("UTC {0} is not in ISO 8601 form")]
+    #[cause(Bug: "report this with the versions of CSPICE and areograph")]
+    NotIso(String),
     /// The file is not a kernel that can be loaded.
     #[error("is {found}; expected {expected}")]
     #[cause("fetch the kernel again from NAIF, or correct the list of kernels")]

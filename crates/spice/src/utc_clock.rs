@@ -58,7 +58,7 @@ impl<'a> UtcClock<'a> {
     /// UTC of an instant.
     ///
     /// # Errors
-    /// As [`Session::et_to_utc_with`]; [`SpiceError::NoCalendar`] outside the years of the calendar.
+    /// As [`Session::et_to_utc_with`], also for years before 1 and after 9999, which ISO 8601 does not have.
     pub fn utc(&mut self, et: Et) -> Result<Utc> {
         let hour = self.hour.as_ref();
         if let Some((start, since_us)) = hour.and_then(|of| Some((of.start, of.microseconds(et)?)))
@@ -67,7 +67,7 @@ impl<'a> UtcClock<'a> {
             return Ok(Utc::from_microseconds(start.microseconds() + since_us));
         }
         let text = self.session.et_to_utc_with(et, DECIMALS)?;
-        let utc = Utc::parse(&text).ok_or_else(|| SpiceError::NoCalendar(text.clone()))?;
+        let utc = Utc::parse(&text).ok_or_else(|| SpiceError::NotIso(text.clone()))?;
         let Some((hour, _)) = text.split_once(':') else {
             return Ok(utc);
         };

@@ -118,7 +118,7 @@ fn utc_by_the_hour_is_that_of_cspice() {
         }
     }
     let far = clock.utc(Et::from_seconds(-1e13)).unwrap_err().to_string();
-    assert!(far.contains("is not a date of tables"), "{far}");
+    assert!(far.contains("YEAROUTOFRANGE"), "{far}");
     println!("{differ} of {compared} differ in the last digit");
     assert!(differ * 1_000 < compared, "{differ} of {compared}");
 }
