@@ -155,6 +155,9 @@ pub fn convert_datum(footprints: Footprints<AsRead>, clock: &MolaClock) -> Conve
 /// Rows that are converted at once.
 const ROWS_AT_ONCE: usize = 1 << 16;
 
+/// Longitude and latitude of footprint and spacecraft, radians.
+type Places = [(f64, f64); 2];
+
 /// The shift of a footprint by a conversion.
 #[derive(Debug, Clone, Copy, Default)]
 struct Shift {
@@ -195,7 +198,7 @@ fn turned(
             let moved = datums[usize::from(shot.file)].moved(&shot)?;
             Some((moved, Shift::of(&shot, moved[0])))
         });
-        let moved: Vec<Option<([(f64, f64); 2], Shift)>> = moved.collect();
+        let moved: Vec<Option<(Places, Shift)>> = moved.collect();
         for (row, moved) in rows.zip(moved) {
             let shift = moved.map_or_else(Shift::default, |([ground, spacecraft], shift)| {
                 (converted.longitude_rad[row], converted.latitude_rad[row]) = ground;
@@ -267,7 +270,7 @@ impl DatumTurn {
     }
 
     /// Longitude and latitude of footprint and spacecraft in IAU 2000; `None` where they need no conversion.
-    fn moved(&self, shot: &Footprint) -> Option<[(f64, f64); 2]> {
+    fn moved(&self, shot: &Footprint) -> Option<Places> {
         if self.is_none() {
             return None;
         }
