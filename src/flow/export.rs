@@ -51,7 +51,7 @@ pub struct Exported {
 /// write errors.
 pub fn export_site(folder: &Path, formats: &[ShotFormat], to: Option<&Path>) -> Result<Exported> {
     let manifest = read_published_by_this_version(folder, |_| false)?;
-    let data = PageData::read(folder)?;
+    let data = PageData::without_tables(folder)?;
     still_published(folder, &manifest)?;
     let site = manifest.site;
     let to = to.map_or_else(|| format!("{site}_export").into(), Path::to_owned);

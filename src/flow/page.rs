@@ -1,7 +1,7 @@
 //! The page of a published site, rebuilt from its products.
 //!
 //! The book of the site's outputs is a separate product, unrounded (`products/page_data.rs`), and the page depends only on
-//! it (decision 0023).
+//! it and on tables beside it (decision 0023).
 
 use std::path::{Path, PathBuf};
 

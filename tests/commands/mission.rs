@@ -295,7 +295,7 @@ fn a_fine_scan_has_the_spreads_of_a_coarse_one() {
             config.range_check.scan_step_s = half_width_s / steps;
         }
         let found = found(&coarse);
-        // Of five corrections each has its own residuals, of sixty-one they are interpolated.
+        // Residuals are computed at each of five corrections, and interpolated for sixty-one.
         let coarse = checked("nav", &coarse, &found);
         let fine = checked("nav", &fine, &found);
         let (mut compared, mut is_interpolated) = (0, false);

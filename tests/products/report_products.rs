@@ -126,7 +126,7 @@ type Spoil = fn(&Path);
 
 #[test]
 fn products_that_the_page_cannot_be_made_from_are_refused() {
-    let spoiled: [(&str, Spoil); 7] = [
+    let spoiled: [(&str, Spoil); 8] = [
         ("no folder", |folder| fs::remove_dir_all(folder).unwrap()),
         ("no manifest", |folder| {
             fs::remove_file(folder.join("manifest.json")).unwrap();
@@ -152,6 +152,11 @@ fn products_that_the_page_cannot_be_made_from_are_refused() {
             let version = format!("\"version\": \"{}\"", env!("CARGO_PKG_VERSION"));
             assert!(manifest.contains(&version));
             fs::write(path, manifest.replace(&version, "\"version\": \"0.0.9\"")).unwrap();
+        }),
+        ("a table of other columns", |folder| {
+            let table = folder.join("registration.parquet");
+            fs::copy(table, folder.join("ranges.parquet")).unwrap();
+            vouch_for(folder, "ranges.parquet");
         }),
         ("another page was published", |folder| {
             fs::write(folder.join("report/index.html"), "another").unwrap();

@@ -1,8 +1,8 @@
 //! Columns of numbers in stored outputs, compressed without loss.
 //!
-//! A million shots have a dozen numbers each. As plain numbers they are five to ten times as large as when each column
-//! is compressed by itself, and a run writes them several times. A field with
-//! `#[serde(with = "areograph_base::packed")]` is stored as the bytes that [`serialize`] makes.
+//! Each shot has about twenty numbers, and a run stores them several times. Compressing each column separately reduces
+//! their size by a factor of 5 to 15. A field with `#[serde(with = "areograph_base::packed")]` is stored in the form that
+//! [`serialize`] produces.
 
 use std::fmt;
 
@@ -14,12 +14,12 @@ use pco::{
 use rayon::prelude::*;
 use serde::{Deserializer, Serializer, de, ser::Error as _};
 
-/// Values that are compressed at once, by one thread.
+/// Number of values that one thread compresses as a piece.
 const PIECE: usize = 1 << 17;
-/// Bytes of the number of values, and of the length of a piece.
+/// Size of an encoded count or length, bytes.
 const LENGTH_BYTES: usize = 8;
 
-/// A value that a packed column may have, as a number.
+/// A type whose values can be stored in a packed column.
 pub trait Packed: Copy + Send + Sync {
     /// The number.
     type Number: Number + Send;
@@ -27,7 +27,7 @@ pub trait Packed: Copy + Send + Sync {
     /// The value as a number.
     fn number(self) -> Self::Number;
 
-    /// The value of a number.
+    /// The value that this number represents.
     fn of(number: Self::Number) -> Self;
 }
 
@@ -61,7 +61,7 @@ impl Packed for bool {
     }
 }
 
-/// Stores a column as bytes: the number of its values, then its pieces, each after its length.
+/// Stores a column as bytes: the number of values, then the pieces, each preceded by its length.
 ///
 /// The bytes depend on the values alone, not on the number of threads.
 ///
@@ -90,14 +90,14 @@ pub fn deserialize<'de, T: Packed, D: Deserializer<'de>>(
     deserializer: D,
 ) -> Result<Vec<T>, D::Error> {
     let bytes = deserializer.deserialize_bytes(Bytes)?;
-    unpacked(&bytes).ok_or_else(|| de::Error::custom("a damaged column"))
+    unpacked(&bytes).ok_or_else(|| de::Error::custom("a stored column is damaged"))
 }
 
 const fn length(count: usize) -> [u8; LENGTH_BYTES] {
     (count as u64).to_le_bytes()
 }
 
-/// The length at the start of `bytes`, and the bytes behind it.
+/// The length at the start of `bytes`, and the bytes that follow it.
 fn split_length(bytes: &[u8]) -> Option<(usize, &[u8])> {
     let (length, rest) = bytes.split_first_chunk::<LENGTH_BYTES>()?;
     Some((usize::try_from(u64::from_le_bytes(*length)).ok()?, rest))
@@ -121,7 +121,7 @@ fn unpacked<T: Packed>(bytes: &[u8]) -> Option<Vec<T>> {
     (values.len() == count).then_some(values)
 }
 
-/// Bytes, which the stored outputs have without a copy.
+/// Visitor of bytes; borrows them from a stored output instead of copying them.
 struct Bytes;
 
 impl<'de> de::Visitor<'de> for Bytes {
@@ -200,7 +200,7 @@ mod tests {
         let bytes = postcard::to_stdvec(&columns(100)).unwrap();
         let cut = &bytes[..bytes.len() - 1];
         assert!(postcard::from_bytes::<Columns>(cut).is_err());
-        // One value more than there are.
+        // The count states one value more than is stored.
         let mut more = bytes;
         let count = more.windows(8).position(|of| of == length(100)).unwrap();
         more[count] = 101;

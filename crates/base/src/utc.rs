@@ -1,4 +1,4 @@
-//! UTC of shots, as tables have it.
+//! UTC of shots as stored in tables.
 
 use std::fmt;
 
@@ -13,7 +13,10 @@ use crate::packed::Packed;
 pub struct Utc(i64);
 
 impl Utc {
-    /// The instant so many microseconds after 1970 began.
+    /// Marks an unknown instant; a table that contains it is refused.
+    pub const UNKNOWN: Self = Self(i64::MIN);
+
+    /// The instant this many microseconds after the start of 1970.
     #[must_use]
     pub const fn from_microseconds(microseconds: i64) -> Self {
         Self(microseconds)
@@ -25,9 +28,21 @@ impl Utc {
         self.0
     }
 
-    /// Of an ISO 8601 text without a zone letter, such as `1999-08-24T14:12:13.046`; `None` for any other text.
+    /// Parses an ISO 8601 text with one to six decimals of a second and without a zone letter, such as
+    /// `1999-08-24T14:12:13.046`; `None` for any other text.
     #[must_use]
     pub fn parse(text: &str) -> Option<Self> {
+        // The library also reads spaces, short numbers and leap seconds of any minute.
+        let form = b"0000-00-00T00:00:00.";
+        let has_form = text.bytes().zip(form).all(|(byte, of_form)| match of_form {
+            b'0' => byte.is_ascii_digit(),
+            mark => byte == *mark,
+        });
+        let is_leap = text.get(17..19) == Some("60");
+        let is_last = text.get(11..16) == Some("23:59");
+        if !has_form || !(21..=26).contains(&text.len()) || (is_leap && !is_last) {
+            return None;
+        }
         let time = NaiveDateTime::parse_from_str(text, "%Y-%m-%dT%H:%M:%S%.f").ok()?;
         Some(Self(time.and_utc().timestamp_micros()))
     }
@@ -79,7 +94,11 @@ mod tests {
             "1999-08-24 14:12:13.046",
             "1999-02-30T14:12:13.046",
             "1999-08-24T25:12:13.046",
+            "1999-08-24T14:12:60.046",
+            "1999-08-24T14:12:13.0460000",
             "1999-08-24T14:12:13,046",
+            "1999-08-24T+4:12:13.046",
+            "1999-8-24T14:12:13.0461",
         ] {
             assert_eq!(Utc::parse(text), None, "{text}");
         }

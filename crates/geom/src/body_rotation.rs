@@ -83,7 +83,7 @@ pub struct DatumConversion {
 impl DatumConversion {
     /// From the frame of `datum` at `out_at` to the products' frame of `body` at `into_at`.
     ///
-    /// Both instants are equal unless a clock correction is to rotate the body in between.
+    /// Both instants are equal unless a clock correction rotates the body between them.
     #[must_use]
     pub fn of(body: Body, datum: Datum, out_at: Et, into_at: Et) -> Self {
         Self {

@@ -100,9 +100,9 @@ pub(super) trait ShotNames: Sync {
     /// Identifiers of the windows that hold the shot in this row, separated by semicolons.
     fn windows(&self, row: usize) -> String;
 
-    /// Its UTC; of sources without it, for tables without this column, an arbitrary instant.
+    /// Its UTC; unknown for shots of tables without this column.
     fn utc(&self, _row: usize) -> Utc {
-        Utc::from_microseconds(0)
+        Utc::UNKNOWN
     }
 }
 
@@ -117,7 +117,7 @@ impl ShotNames for SiteProducts<'_> {
 }
 
 impl<'a> Shot<'a> {
-    /// The shot of a site in this row.
+    /// The shot in this row of a site's footprints.
     pub(super) const fn of(site: &'a SiteProducts<'a>, row: usize) -> Self {
         Self {
             footprints: site.footprints,

@@ -1,10 +1,9 @@
 //! The book of a site's outputs as a product: the page can be regenerated from it and the tables beside it.
 //!
-//! Tables and documents are written for their readers, with the digits and the selection that these need. The page
-//! shows more: surfaces, histograms, spans of kernels. The outputs are therefore kept, without what a table has in
-//! the same numbers: residuals of the range check, and places of footprints in images. Camera tables and map pixels,
-//! which no page shows, are omitted. So are the points of images without plots: at a site of a thousand images they
-//! amounted to a quarter of a gigabyte.
+//! Documents are written for their readers, with the digits and the selection that these need. The page shows more:
+//! surfaces, histograms, spans of kernels. The outputs are therefore kept, except values that a table contains unrounded:
+//! residuals of the range check and places of footprints in images. Camera tables and map pixels, which no page shows,
+//! are omitted. A page needs the places in images with plots alone.
 
 use std::path::{Path, PathBuf};
 
@@ -26,9 +25,10 @@ use areograph_spice::KernelSet;
 use areograph_stages::{
     adjust::Adjusted,
     check_ranges::{RangeCheck, ShotResiduals},
+    convert_datum::Converted,
     group_profiles::Profile,
     orientation::Orientation,
-    register::ImageRegistration,
+    register::{ImageRegistration, RegisteredPoints},
     search_footprints::SearchResult,
     tabulate_kernels::KernelTables,
 };
@@ -46,7 +46,7 @@ pub const PAGE_DATA: &str = "report/page.postcard";
 
 pub(super) static DATA: Declaration = Declaration {
     path: PAGE_DATA,
-    what: "all data of the report, unrounded, in the layout of this version of areograph; BLAKE3 in the manifest",
+    what: "data of the report that no table contains, unrounded, in the layout of this version of areograph; BLAKE3 in the manifest",
     readers: "`areograph report`, `areograph export`",
     rows: "",
     role: Role::Metadata,
@@ -74,15 +74,25 @@ pub struct PageData {
 }
 
 impl PageData {
-    /// Opens it in the folder of a site.
+    /// Opens it in the folder of a site, with the values of the tables there.
+    ///
+    /// # Errors
+    /// A file of kind input that this version did not write; tables that do not belong to it; an error of the disk.
+    pub fn read(site_folder: &Path) -> Result<Self> {
+        let mut data = Self::without_tables(site_folder)?;
+        let shown = data.book.of::<PageConfig>()?.shown.clone();
+        fill(&mut data.book, site_folder, &shown)?;
+        Ok(data)
+    }
+
+    /// Opens it in the folder of a site, without residuals of ranges and points in images.
     ///
     /// # Errors
     /// A file of kind input that this version did not write; an error of the disk.
-    pub fn read(site_folder: &Path) -> Result<Self> {
+    pub fn without_tables(site_folder: &Path) -> Result<Self> {
         let path = site_folder.join(PAGE_DATA);
-        let mut book = Book::open(&path, LAYOUT)?;
+        let book = Book::open(&path, LAYOUT)?;
         let stored: PageConfig = book.of::<PageConfig>().in_file(&path)?.clone();
-        fill(&mut book, site_folder, &stored.shown)?;
         let mut config: SiteConfig = toml::from_str(&stored.config)
             .map_err(ReadError::unreadable("a configuration"))
             .in_file(&path)?;
@@ -138,7 +148,7 @@ fn page_book(site: &SiteProducts) -> Result<Book> {
     Ok(book)
 }
 
-/// The tables with the points of registrations, by their round.
+/// The tables of registered points, with their rounds.
 fn registration_tables(book: &Book) -> Vec<(Round, &'static str)> {
     let mut tables = vec![(Round::Initial, registration::TABLE.path)];
     if book.has::<Adjusted>(Round::Initial) {
@@ -147,20 +157,36 @@ fn registration_tables(book: &Book) -> Vec<(Round, &'static str)> {
     tables
 }
 
-/// Adds to the book what the tables of the site have.
+/// Restores the values that the book leaves to the tables of the site.
 fn fill(book: &mut Book, site_folder: &Path, shown: &[usize]) -> Result<()> {
+    let footprints = book.of::<Converted>()?.footprints.len();
     let profiles = book.of::<Vec<Profile>>()?.iter();
     let profiles: Vec<String> = profiles.map(|profile| profile.id.clone()).collect();
-    let residuals = read_residuals(&site_folder.join(ranges::TABLE.path), &profiles)?;
+    let table = site_folder.join(ranges::TABLE.path);
+    let mut residuals = Some(read_residuals(&table, &profiles, footprints)?);
     book.change(Round::Initial, |_, of: &RangeCheck| {
-        Some(of.with_shots(residuals.clone()))
+        residuals.take().map(|residuals| of.with_shots(residuals))
     })?;
     for (round, table) in registration_tables(book) {
-        let images = book.parts::<ImageRegistration>(round)?;
-        let images: Vec<String> = images.iter().map(|of| of.image.clone()).collect();
-        let points = read_points(&site_folder.join(table), &images, &profiles, shown)?;
+        let table = site_folder.join(table);
+        let registrations = book.parts::<ImageRegistration>(round)?;
+        let images = registrations.iter().map(|of| of.image.clone());
+        let images: Vec<String> = images.collect();
+        let mut points = read_points(&table, &images, &profiles, footprints, shown)?;
+        for image in shown {
+            let registration = registrations.get(*image);
+            let expected = registration.map_or(0, |of| {
+                of.profiles.iter().map(|of| of.points as usize).sum()
+            });
+            let found = points.get(*image).map_or(0, RegisteredPoints::len);
+            if found != expected {
+                let reason = format!("{found} points of an image; expected {expected}");
+                let mismatch = ReadError::unreadable("the table of these page data");
+                return Err(mismatch(reason)).in_file(&table);
+            }
+        }
         book.change(round, |index, of: &ImageRegistration| {
-            Some(of.with_points(points.get(index)?.clone()))
+            Some(of.with_points(std::mem::take(points.get_mut(index)?)))
         })?;
     }
     Ok(())

@@ -44,7 +44,7 @@ pub(super) fn write(path: &Path, table: &Table, metadata: Vec<(&str, String)>) -
     Ok(table.rows() as u64)
 }
 
-/// Digests of the columns of a piece of a table.
+/// One digest for each column of a piece of a table.
 type Digests = Vec<blake3::Hash>;
 
 /// Writes the table; returns the digests of its pieces.
@@ -65,15 +65,16 @@ fn encode(
     Ok(digests)
 }
 
-/// Digest of the values of an array of one of the types that tables have.
+/// Digest of the values of an array; its type must be one that tables contain.
 fn digest(array: &ArrayRef) -> blake3::Hash {
     let mut hasher = blake3::Hasher::new();
     match array.data_type() {
         DataType::Float64 if array.null_count() > 0 => {
-            // Tables contain no NaN: here it represents a missing value.
-            let values = array.as_primitive::<Float64Type>().iter();
-            let values = values.flat_map(|of| of.unwrap_or(f64::NAN).to_le_bytes());
-            hasher.update(&values.collect::<Vec<u8>>());
+            let values = || array.as_primitive::<Float64Type>().iter();
+            let is_known = values().map(|of| u8::from(of.is_some()));
+            hasher.update(&is_known.collect::<Vec<u8>>());
+            let known = values().flatten().flat_map(f64::to_le_bytes);
+            hasher.update(&known.collect::<Vec<u8>>());
         }
         DataType::Boolean => {
             let values = array.as_boolean().values().iter();
@@ -215,7 +216,7 @@ fn require_rows(found: usize, expected: usize) -> Result<()> {
     .into())
 }
 
-/// Compares these rows of a file with the digests of the table, whose pieces begin where groups do.
+/// Compares these rows of a file with the digests of the table; every group begins at the start of a piece.
 fn compare(
     batches: ParquetRecordBatchReader,
     range: &Range<usize>,
@@ -278,6 +279,43 @@ mod tests {
         of_column("a_m", refused(present));
         let sign = vec![(Some(0.0), "ab"), (None, "c"), (Some(0.0), "d")];
         of_column("a_m", refused(sign));
+        // Values of every other type, in a second group.
+        let long = |spoilt: usize, column_at: usize| {
+            let of = move |at: usize| (i32::try_from(at).unwrap(), at == spoilt);
+            let columns: Vec<Column<(i32, bool)>> = vec![
+                column("count", Unit::None, "", move |row: &(i32, bool)| {
+                    row.0.unsigned_abs() + u32::from(row.1 && column_at == 0)
+                }),
+                column("class", Unit::None, "", move |row: &(i32, bool)| {
+                    -row.0 - i32::from(row.1 && column_at == 1)
+                }),
+                column("flag", Unit::None, "", move |row: &(i32, bool)| {
+                    (row.0 % 3 == 0) != (row.1 && column_at == 2)
+                }),
+                column("utc", Unit::None, "", move |row: &(i32, bool)| {
+                    let later = i64::from(row.1 && column_at == 3);
+                    Utc::from_microseconds(i64::from(row.0) + later)
+                }),
+                column("geometry", Unit::None, "", move |row: &(i32, bool)| {
+                    vec![row.0.to_le_bytes()[0], u8::from(row.1 && column_at == 4)]
+                }),
+            ];
+            Table::of(columns, 5 * ROWS_AT_ONCE + 3, of)
+        };
+        let path_long = folder.path().join("long.parquet");
+        write(&path_long, &long(usize::MAX, 0), Vec::new()).unwrap();
+        for (column_at, name) in ["count", "class", "flag", "utc", "geometry"]
+            .iter()
+            .enumerate()
+        {
+            let expected = long(5 * ROWS_AT_ONCE + 1, column_at);
+            let digests = encode(Vec::new(), &expected, Vec::new()).unwrap();
+            let failure = read_back(&path_long, &expected, &digests)
+                .unwrap_err()
+                .to_string();
+            let place = format!("column {name}, from row {}", 5 * ROWS_AT_ONCE + 1);
+            assert!(failure.contains(&place), "{failure}");
+        }
         let fewer = refused(rows("d")[..2].to_vec());
         assert!(fewer.contains("3 rows of 2"), "{fewer}");
     }

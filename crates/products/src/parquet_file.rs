@@ -2,6 +2,7 @@
 
 use std::{io::Write, sync::Arc};
 
+use super::table::ROWS_AT_ONCE;
 use ::parquet::{
     arrow::{
         ArrowWriter,
@@ -25,6 +26,8 @@ use rayon::prelude::*;
 
 /// Rows of a group, whose encoded columns are kept in memory until it is complete; readers skip groups.
 const GROUP_ROWS: usize = 1 << 18;
+/// Files are compared piece by piece.
+const _: () = assert!(GROUP_ROWS.is_multiple_of(ROWS_AT_ONCE));
 
 type Result<T> = std::result::Result<T, ParquetError>;
 
@@ -122,8 +125,8 @@ impl<W: Write + Send> ParquetFile<W> {
     }
 }
 
-/// Encoding by which a column compresses best: measured numbers, which rarely repeat, byte by byte; counts and times, which
-/// grow in steps, by their differences; geometries as they are; all others through a dictionary.
+/// Encoding by which a column compresses best: byte-stream splitting for measured numbers, which rarely repeat;
+/// differences for counts and times, which increase in steps; no encoding for geometries; a dictionary for all others.
 fn encoded(
     properties: WriterPropertiesBuilder,
     field: &Field,

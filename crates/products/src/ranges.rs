@@ -180,7 +180,7 @@ struct Scan<'a> {
 pub(super) static TABLE: Declaration = Declaration {
     path: "ranges.parquet",
     what: "residuals of the range check per shot",
-    readers: "scripts",
+    readers: "scripts, `areograph report`",
     rows: "shots in profiles",
     role: Role::Data,
     content: Content::Table(|| meanings(&columns())),
@@ -219,7 +219,7 @@ impl RangedShot<'_> {
         self.site.ranges.shots.row[self.at]
     }
 
-    /// The column of footprints that `of` picks, in the row of the shot.
+    /// The value of this shot in the footprint column that `of` selects.
     fn footprint<T: Copy>(&self, of: fn(&Footprints<BodyFixed>) -> &Vec<T>) -> T {
         of(self.site.footprints)[self.row() as usize]
     }

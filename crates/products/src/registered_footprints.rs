@@ -97,7 +97,11 @@ pub(crate) static GEOPACKAGE: Declaration = Declaration {
 fn has(site: &SiteProducts) -> bool {
     let adjusted = site.adjustment().map(|(_, of)| of.images);
     let mut images = site.images.iter().chain(adjusted.unwrap_or_default());
-    !site.footprints.is_empty() && images.any(|image| image.registration.points.inside_count() > 0)
+    let has_inside = |image: &ImageProducts| {
+        let mut profiles = image.registration.profiles.iter();
+        profiles.any(|profile| profile.inside > 0)
+    };
+    !site.footprints.is_empty() && images.any(has_inside)
 }
 
 /// The column `height_m`: heights above the sphere of the maps, metres.
@@ -196,7 +200,7 @@ fn places(
     let rounds = [Some(before), after];
     let rounds = rounds.map(|image| image.map(|image| &image.registration.points));
     let mut places: BTreeMap<usize, (usize, [Option<Place>; 2])> = BTreeMap::new();
-    // Few of the points are inside an image.
+    // Only rows with a point inside an image are needed, and these are few.
     for points in rounds.into_iter().flatten() {
         let inside = (0..points.len()).filter(|at| points.inside[*at]);
         places.extend(inside.map(|at| (points.row[at] as usize, (usize::MAX, [None; 2]))));

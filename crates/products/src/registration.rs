@@ -133,7 +133,7 @@ struct ProfileDocument<'a> {
 pub(super) static TABLE: Declaration = Declaration {
     path: "registration.parquet",
     what: "line and sample of every footprint in every image",
-    readers: "scripts",
+    readers: "scripts, `areograph report`",
     rows: "footprints in images",
     role: Role::Data,
     content: Content::Table(|| meanings(&columns())),
@@ -161,7 +161,7 @@ pub(super) static DOCUMENT: Declaration = Declaration {
 pub(super) static ADJUSTED: Declaration = Declaration {
     path: "registration_adjusted.parquet",
     what: "line and sample of every footprint with the adjusted orientation",
-    readers: "scripts",
+    readers: "scripts, `areograph report`",
     rows: "footprints in images",
     role: Role::Data,
     content: Content::Table(|| meanings(&columns())),

@@ -176,7 +176,7 @@ impl<'a> ImageProducts<'a> {
 }
 
 impl<'a> SiteProducts<'a> {
-    /// UTC of the newest shot as text, for formats that state a date; empty without shots.
+    /// UTC of the latest shot as text, for formats that require a date; empty if there are no shots.
     pub(super) fn newest_utc(&self) -> String {
         let newest = self.utc.iter().max();
         newest.map_or_else(String::new, Utc::to_string)

@@ -225,7 +225,7 @@ impl Cell for Option<f64> {
 }
 
 impl Values {
-    /// The first row that is not a finite number.
+    /// The first row that is not a finite number or a known instant.
     fn not_finite(&self) -> Option<usize> {
         match self {
             Self::Real(values) => values.iter().position(|value| !value.is_finite()),
@@ -233,6 +233,7 @@ impl Values {
                 let infinite = |value: &Option<f64>| value.is_some_and(|value| !value.is_finite());
                 values.iter().position(infinite)
             }
+            Self::Time(values) => values.iter().position(|value| *value == Utc::UNKNOWN),
             _ => None,
         }
     }
@@ -246,7 +247,7 @@ pub(super) struct Table<'a> {
 }
 
 impl<'a> Table<'a> {
-    /// The table of `count` rows, each made from its number when its values are computed.
+    /// The table of `count` rows, each created from its index when its values are computed.
     pub(super) fn of<R: Sync + 'a>(
         columns: Vec<Column<R>>,
         count: usize,
@@ -413,6 +414,10 @@ pub(super) mod tests {
             "column a_m, row 2 of 2 is not a finite number"
         );
         assert_eq!(table.values(0..1).unwrap(), [Values::Real(vec![1.0])]);
+        let columns = vec![column("utc", Unit::None, "", |utc: &Utc| *utc)];
+        let table = Table::new(columns, vec![Utc::from_microseconds(0), Utc::UNKNOWN]);
+        let refused = table.values(0..2).unwrap_err().to_string();
+        assert!(refused.contains("column utc, row 2 of 2"), "{refused}");
     }
 
     #[test]

@@ -31,8 +31,8 @@ pub enum SpiceError {
     #[error("a SPICE session is already open on this thread")]
     #[cause(Bug: "report this: a stage opened a second session")]
     SessionOpen,
-    /// CSPICE has written a date in another form than it documents.
-    #[error("UTC {0} is not in ISO 8601 form")]
+    /// CSPICE returned a date in a form other than the documented one.
+    #[error("CSPICE returned the UTC {0}; expected ISO 8601")]
     #[cause(Bug: "report this with the versions of CSPICE and areograph")]
     NotIso(String),
     /// The file is not a kernel that can be loaded.

@@ -11,8 +11,8 @@ const SECOND_US: u32 = 1_000_000;
 /// Last second of an hour whose length no leap second changes.
 const LAST_S: u32 = 3_599;
 
-/// UTC as `et2utc` gives it, to a microsecond. CSPICE, which takes 3 µs, is asked once for each hour of UTC; the other instants of the hour
-/// are computed from it.
+/// UTC as `et2utc` gives it, to a microsecond. CSPICE, which takes 3 µs per call, is called once per hour of UTC; other
+/// instants of the hour are computed from its result.
 ///
 /// From the full hour to its last regular second ET − UTC changes only by TDB − TT: by at most 1.2 µs, and linearly within
 /// 2e-10 s. A leap second follows that last second. Times differ from CSPICE's only by the rounding of the last digit.
@@ -58,7 +58,7 @@ impl<'a> UtcClock<'a> {
     /// UTC of an instant.
     ///
     /// # Errors
-    /// As [`Session::et_to_utc_with`], also for years before 1 and after 9999, which ISO 8601 does not have.
+    /// As [`Session::et_to_utc_with`]; also an error of CSPICE for years before 1 or after 9999.
     pub fn utc(&mut self, et: Et) -> Result<Utc> {
         let hour = self.hour.as_ref();
         if let Some((start, since_us)) = hour.and_then(|of| Some((of.start, of.microseconds(et)?)))

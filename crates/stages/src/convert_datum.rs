@@ -9,7 +9,7 @@ use super::search_footprints::SearchResult;
 use areograph_base::{
     altimetry::{BiasScope, GroundRadius, MolaClock, TagSign},
     body::{Body, Datum},
-    error::Result,
+    error::{Cause, Result},
     footprints::{AsRead, Footprint, Footprints, SourceFile},
     frames::BodyFixed,
     time::Et,
@@ -52,7 +52,7 @@ stage_inputs! {
     pub struct ConvertDatum<'a> {
         /// Results of the search.
         pub found: &'a Output<SearchResult>,
-        /// Its shots, if these were taken out of it.
+        /// The shots, if they were taken out of `found`.
         pub shots: FoundShots,
         /// The clock of MOLA.
         pub altimeter_clock: &'a MolaClock,
@@ -61,24 +61,41 @@ stage_inputs! {
     }
 }
 
-/// Shots taken out of the results of a search, which are converted in place: a million occupy a fifth of a gigabyte.
+/// Shots taken out of the results of a search, so that they are converted in place: a million shots occupy 0.2 GB.
 #[derive(Debug)]
-pub struct FoundShots(Mutex<Option<Footprints<AsRead>>>);
+pub struct FoundShots {
+    were_taken: bool,
+    shots: Mutex<Option<Footprints<AsRead>>>,
+}
+
+/// A second conversion of shots that were converted in place.
+#[derive(Debug, thiserror::Error, Cause)]
+#[error("the shots of the search were converted already")]
+#[cause(Bug: "this is a bug in areograph; please report it with the configuration")]
+struct ConvertedAlready;
 
 impl FoundShots {
     /// These shots; `None` if the results still have them.
     #[must_use]
     pub const fn of(shots: Option<Footprints<AsRead>>) -> Self {
-        Self(Mutex::new(shots))
+        Self {
+            were_taken: shots.is_some(),
+            shots: Mutex::new(shots),
+        }
     }
 
-    fn take(&self) -> Option<Footprints<AsRead>> {
-        let mut shots = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        shots.take()
+    /// The shots, once; otherwise a copy of the shots in `found`.
+    fn take(&self, found: &Output<SearchResult>) -> Result<Footprints<AsRead>> {
+        let mut shots = self.shots.lock().unwrap_or_else(PoisonError::into_inner);
+        match shots.take() {
+            Some(shots) => Ok(shots),
+            None if self.were_taken => Err(ConvertedAlready.into()),
+            None => Ok(found.value()?.footprints.clone()),
+        }
     }
 }
 
-/// The results of the search represent them.
+/// They add no input: the fingerprint already contains the search results.
 impl Input for FoundShots {
     fn add_to(&self, _field: &str, _inputs: &mut Inputs) {}
 }
@@ -91,10 +108,7 @@ impl Stage for ConvertDatum<'_> {
     stage_inputs!(fingerprint);
 
     fn run(&self, _stop: &AtomicBool) -> Result<Converted> {
-        let mut footprints = match self.shots.take() {
-            Some(shots) => shots,
-            None => self.found.value()?.footprints.clone(),
-        };
+        let mut footprints = self.shots.take(self.found)?;
         footprints.ground = *self.ground;
         let choice = footprints.ground_choice();
         let mut converted = convert_datum(footprints, self.altimeter_clock);
@@ -168,7 +182,7 @@ struct Shift {
 }
 
 impl Shift {
-    /// From the shot to its place on the ground after the conversion.
+    /// The shift of this shot to its converted longitude and latitude.
     fn of(shot: &Footprint, (longitude_rad, latitude_rad): (f64, f64)) -> Self {
         let here = spherical_to_xyz_m(shot.longitude_rad, shot.latitude_rad, shot.radius_m);
         let there = spherical_to_xyz_m(longitude_rad, latitude_rad, shot.radius_m);
@@ -179,11 +193,11 @@ impl Shift {
     }
 }
 
-/// The footprints, with every shot converted from its file's datum; `hear` receives the file and the shift of every shot.
+/// The footprints, with every shot converted from its file's datum; `record` is called with the file and the shift of each shot.
 fn turned(
     footprints: Footprints<AsRead>,
     clock: &MolaClock,
-    mut hear: impl FnMut(usize, Shift),
+    mut record: impl FnMut(usize, Shift),
 ) -> Footprints<BodyFixed> {
     let datums = footprints.files.iter();
     let datums: Vec<DatumTurn> = datums
@@ -208,7 +222,7 @@ fn turned(
                 ) = spacecraft;
                 shift
             });
-            hear(usize::from(converted.file[row]), shift);
+            record(usize::from(converted.file[row]), shift);
         }
     }
     converted

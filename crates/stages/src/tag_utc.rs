@@ -27,7 +27,7 @@ stage_inputs! {
     }
 }
 
-/// UTC of the corrected time of every footprint, in their order.
+/// UTC of the corrected times, in the order of the footprints.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct ShotTimes(#[serde(with = "packed")] pub Vec<Utc>);

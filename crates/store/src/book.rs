@@ -136,15 +136,15 @@ impl Book {
         Ok(())
     }
 
-    /// Replaces the outputs of this type and round by what `change` returns for their indices and values; `None` keeps
-    /// one.
+    /// Replaces each output of this type and round with what `change` returns for its index and value; `None` keeps the
+    /// output.
     ///
     /// # Errors
     /// An output whose value is not known or cannot be read.
     pub fn change<T: Entered>(
         &mut self,
         round: Round,
-        change: impl Fn(usize, &T) -> Option<T>,
+        change: impl FnMut(usize, &T) -> Option<T>,
     ) -> Result<()> {
         if let Some(entry) = self.entries.get_mut(&key::<T>(round)) {
             *entry = entry.changed(change)?;
@@ -237,7 +237,7 @@ impl Entry {
     }
 
     /// See [`Book::change`].
-    fn changed<T: Entered>(&self, change: impl Fn(usize, &T) -> Option<T>) -> Result<Self> {
+    fn changed<T: Entered>(&self, mut change: impl FnMut(usize, &T) -> Option<T>) -> Result<Self> {
         let outputs: Option<&Vec<Output<T>>> = self.outputs::<T>()?.downcast_ref();
         let outputs = outputs.into_iter().flatten().enumerate();
         let changed = outputs.map(|(index, output)| {

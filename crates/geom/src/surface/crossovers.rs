@@ -57,7 +57,7 @@ pub fn crossovers(shots: &[SurfaceShot], options: &SurfaceOptions) -> Vec<Crosso
         .map(|shot| Placed::new(model, &plan, shot, options.profile_sigma_m))
         .collect();
     let segments = segments(&placed, options.shot_sigma_m);
-    // Every segment in the cells that it touches, cell by cell.
+    // Each segment is listed in every cell of its bounding box; sorted by cell.
     let mut entries: Vec<([i64; 2], usize)> = Vec::with_capacity(segments.len());
     for (index, segment) in segments.iter().enumerate() {
         let [one, other] = [cell(&segment.from.plan_m), cell(&segment.to.plan_m)];

@@ -119,12 +119,12 @@ impl Batch {
         self.column(name, "32-bit unsigned integer", false)
     }
 
-    /// A column of yes and no.
+    /// A column of flags.
     pub(super) fn flags(
         &self,
         name: &'static str,
     ) -> std::result::Result<&BooleanArray, ReadError> {
-        self.column(name, "yes or no", false)
+        self.column(name, "Boolean", false)
     }
 
     /// A column of texts.

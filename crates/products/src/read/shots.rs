@@ -1,4 +1,4 @@
-//! Columns of shots that the data of a page leave to the tables.
+//! Columns of shots that are read from the tables instead of the page data.
 
 use std::{collections::BTreeMap, ops::Range, path::Path};
 
@@ -9,7 +9,7 @@ use super::{
 use areograph_base::error::Result;
 use areograph_stages::{check_ranges::ShotResiduals, register::RegisteredPoints};
 
-/// Indices of texts of a column.
+/// Index of each text of a column.
 type Indices<'a> = BTreeMap<&'a str, u32>;
 
 /// The index of each of `texts`.
@@ -17,7 +17,7 @@ fn indices(texts: &[String]) -> Indices<'_> {
     texts.iter().map(String::as_str).zip(0..).collect()
 }
 
-/// The index of a text, which must have one.
+/// The index of a text; an error if it has none.
 fn index(
     indices: &Indices,
     name: &'static str,
@@ -32,11 +32,27 @@ fn index(
     indices.get(text).copied().ok_or_else(found)
 }
 
-/// Reads `ranges.parquet` of a site with these profiles, by their identifiers in order.
+/// Ensures that all of `rows` are rows of so many footprints.
+fn require_rows(rows: &[u32], footprints: usize) -> std::result::Result<(), ReadError> {
+    let beyond = rows.iter().find(|row| **row as usize >= footprints);
+    beyond.map_or(Ok(()), |row| {
+        Err(ReadError::Column {
+            name: "footprint_row",
+            found: row.to_string(),
+            expected: "rows of footprints.parquet",
+        })
+    })
+}
+
+/// Reads `ranges.parquet` of a site with so many footprints and these profiles, identified in order.
 ///
 /// # Errors
-/// As [`super::read_footprints`]; a profile that the site does not have.
-pub(crate) fn read_residuals(path: &Path, profiles: &[String]) -> Result<ShotResiduals> {
+/// As [`super::read_footprints`]; a profile or a footprint that the site does not have.
+pub(crate) fn read_residuals(
+    path: &Path,
+    profiles: &[String],
+    footprints: usize,
+) -> Result<ShotResiduals> {
     let profiles = indices(profiles);
     let mut shots = ShotResiduals::default();
     let names = [
@@ -55,7 +71,9 @@ pub(crate) fn read_residuals(path: &Path, profiles: &[String]) -> Result<ShotRes
             let profile = index(&profiles, "profile", profile, "a profile of the site")?;
             shots.profile.push(profile);
         }
-        shots.row.extend(batch.counts("footprint_row")?.values());
+        let rows = batch.counts("footprint_row")?.values();
+        require_rows(rows, footprints)?;
+        shots.row.extend(rows);
         let residuals = [
             ("range_minus_distance_m", &mut shots.range_minus_distance_m),
             (
@@ -80,14 +98,15 @@ pub(crate) fn read_residuals(path: &Path, profiles: &[String]) -> Result<ShotRes
 }
 
 /// Reads `registration.parquet`, or the table of the same columns after the adjustment, of a site with these images and
-/// profiles, by their identifiers in order; points of images that are not `wanted` are left out.
+/// profiles, identified in order; points of images not listed in `wanted` are omitted.
 ///
 /// # Errors
-/// As [`super::read_footprints`]; an image or profile that the site does not have.
+/// As [`super::read_footprints`]; an image, profile or footprint that the site does not have.
 pub(crate) fn read_points(
     path: &Path,
     images: &[String],
     profiles: &[String],
+    footprints: usize,
     wanted: &[usize],
 ) -> Result<Vec<RegisteredPoints>> {
     let (profiles, of_images) = (indices(profiles), indices(images));
@@ -110,6 +129,7 @@ pub(crate) fn read_points(
         "extrapolated",
     ];
     columns::read(path, &names, |batch| {
+        require_rows(batch.counts("footprint_row")?.values(), footprints)?;
         let image: Vec<&str> = batch.texts("image")?.iter().flatten().collect();
         let mut start = 0;
         for same in image.chunk_by(|one, next| one == next) {

@@ -294,7 +294,7 @@ pub fn check_ranges<'a>(
     };
     let mut shots = ShotResiduals::default();
     let mut checked = Vec::with_capacity(profiles.len());
-    // The residuals of a wave are in memory twice.
+    // Profiles are checked in waves: only the residuals of one wave are held twice.
     for start in (0..profiles.len()).step_by(PROFILES_AT_ONCE) {
         let wave = profiles.iter().enumerate().skip(start);
         let wave: Vec<(usize, &Profile)> = wave.take(PROFILES_AT_ONCE).collect();

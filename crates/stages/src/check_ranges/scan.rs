@@ -30,7 +30,7 @@ use areograph_spice::Trajectory;
 /// Fewest shots for a meaningful scan.
 const SHOTS_MIN: usize = 10;
 
-/// Half widths of scans whose residuals are interpolated, seconds: by five and by seven residuals of every shot.
+/// Largest half widths of scans interpolated from five and from seven residuals of each shot, seconds.
 const NARROW_S: [f64; 2] = [0.5, 2.0];
 
 /// Half the time over which the rate of a line of sight is measured, seconds.
@@ -158,11 +158,11 @@ fn spreads_m(sighted: &[Sighted], trajectory: &Trajectory, corrections: &[f64]) 
     corrections.par_iter().map(spread_m).collect()
 }
 
-/// Spreads from residuals at `NODES` corrections: as a function of the correction, the residual of a shot is a
-/// polynomial, and the variance of residuals at any correction follows from their covariances at the nodes.
+/// Spreads from residuals at `NODES` corrections: as a function of the correction, the residual of a shot is
+/// nearly a polynomial, and the variance of residuals at any correction follows from their covariances at the nodes.
 ///
 /// The line of sight turns by `v c / R`, at most 0.014 and 0.06 radians within [`NARROW_S`] (4.7 km/s at a range of 170 km,
-/// the lowest periapsis): the remainders of degree 5 and 7 are below 1e-5 m.
+/// the lowest periapsis): the interpolation errors with five and seven nodes are below 1e-5 m.
 /// `None` for a scan of few steps, or kernels that do not cover every node.
 fn interpolated_spreads_m<const NODES: usize>(
     sighted: &[Sighted],
