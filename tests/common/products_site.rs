@@ -194,6 +194,16 @@ impl Site {
     /// The same with so many copies of its image under other names, the last of which is invalid.
     #[allow(dead_code, reason = "not every test that shares this needs it")]
     pub(crate) fn with_copies<T>(&self, count: usize, with: impl FnOnce(&SiteProducts) -> T) -> T {
+        self.with_changed_copies(count, |_, _| {}, with)
+    }
+
+    /// See [`Self::with_copies`]; `change` receives the index and the registration of every copy.
+    pub(crate) fn with_changed_copies<T>(
+        &self,
+        count: usize,
+        change: impl Fn(usize, &mut ImageRegistration),
+        with: impl FnOnce(&SiteProducts) -> T,
+    ) -> T {
         let copies = (0..count).map(|index| {
             let id = format!("M04-{index:05}");
             let (mut times, mut orientation) = (self.times.clone(), self.orientation.clone());
@@ -202,6 +212,7 @@ impl Site {
             orientation.image.clone_from(&id);
             model.image.clone_from(&id);
             registration.image = id;
+            change(index, &mut registration);
             if index + 1 == count {
                 model.invalid_because.push("made so by hand".to_owned());
             }

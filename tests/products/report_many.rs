@@ -7,6 +7,7 @@ use crate::common::{page::assert_complete, products_site as fixture};
 use areograph::{
     capabilities::{self, write_products},
     products::{IMAGES_SHOWN, PageData, Pages, SiteProducts},
+    stages::register::ImageRegistration,
 };
 use fixture::Site;
 
@@ -80,6 +81,22 @@ fn the_page_of_many_images_is_made_again_from_its_data() {
             .unwrap(),
         page
     );
+    // The same if footprints are inside images without plots alone.
+    let copies = 2 * IMAGES_SHOWN;
+    let shown = site.with_copies(copies, SiteProducts::shown_images);
+    let hide = |index: usize, registration: &mut ImageRegistration| {
+        if shown.binary_search(&index).is_ok() {
+            registration.points.inside.fill(false);
+            for profile in &mut registration.profiles {
+                profile.inside = 0;
+            }
+        }
+    };
+    let page = site.with_changed_copies(copies, hide, written).unwrap();
+    assert!(page.contains("registered_footprints.parquet"));
+    let again = PageData::read(folder.path()).unwrap();
+    let again = again.with(capabilities::declarations(), capabilities::page);
+    assert_eq!(again.unwrap(), page);
     // What is not on the page is a file.
     for index in 0..2 * IMAGES_SHOWN {
         let file = format!("images/M04-{index:05}/orientation.json");

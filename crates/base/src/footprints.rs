@@ -232,14 +232,6 @@ columns! {
     windows: u64,
 }
 
-impl Footprint {
-    /// Height above the areoid, after the crossover correction, metres.
-    #[must_use]
-    pub const fn topography_m(&self) -> f64 {
-        self.radius_crossover_m - self.areoid_radius_m
-    }
-}
-
 impl<D> Footprints<D> {
     /// Height of every shot above the areoid, after the crossover correction, metres.
     #[must_use]

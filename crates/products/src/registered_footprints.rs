@@ -343,7 +343,7 @@ fn ground<'a>() -> Vec<Column<Row<'a>>> {
             "topography_m",
             Unit::Metre,
             "crossover-corrected radius minus the radius of the {areoid}, metres",
-            |row: &Row| row.site.footprints.row(row.footprint).topography_m(),
+            |row: &Row| row.site.footprints.topography_of_m(row.footprint),
         ),
     ]
 }

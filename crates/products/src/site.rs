@@ -176,10 +176,12 @@ impl<'a> ImageProducts<'a> {
 }
 
 impl<'a> SiteProducts<'a> {
-    /// UTC of the latest shot as text, for formats that require a date; empty if there are no shots.
+    /// UTC of the latest shot as text, without shots of the first image, for formats that require a date: a clock would
+    /// give different bytes each time.
     pub(super) fn newest_utc(&self) -> String {
-        let newest = self.utc.iter().max();
-        newest.map_or_else(String::new, Utc::to_string)
+        let newest = self.utc.iter().max().map(Utc::to_string);
+        let first = || Some(self.images.first()?.times.utc_start.clone());
+        newest.or_else(first).unwrap_or_default()
     }
 
     /// The pointing biases with which kernels were read; empty if support data orient all images.

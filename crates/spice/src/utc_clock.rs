@@ -67,15 +67,14 @@ impl<'a> UtcClock<'a> {
             return Ok(Utc::from_microseconds(start.microseconds() + since_us));
         }
         let text = self.session.et_to_utc_with(et, DECIMALS)?;
-        let utc = Utc::parse(&text).ok_or_else(|| SpiceError::NotIso(text.clone()))?;
-        let Some((hour, _)) = text.split_once(':') else {
-            return Ok(utc);
-        };
-        let full_hour = format!("{hour}:00:00");
+        let not_iso = || SpiceError::NotIso(text.clone());
+        let utc = Utc::parse(&text).ok_or_else(not_iso)?;
+        let (hour, _) = text.split_once(':').ok_or_else(not_iso)?;
+        let full_hour = format!("{hour}:00:00.0");
         let start_s = self.session.utc_to_et(&full_hour)?.seconds();
         let last_s = self.session.utc_to_et(&format!("{hour}:59:59"))?.seconds();
-        self.hour = Utc::parse(&full_hour).map(|start| Hour {
-            start,
+        self.hour = Some(Hour {
+            start: Utc::parse(&full_hour).ok_or_else(not_iso)?,
             start_s,
             rate: f64::from(LAST_S) / (last_s - start_s),
         });

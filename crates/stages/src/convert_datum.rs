@@ -149,7 +149,7 @@ pub fn convert_datum(footprints: Footprints<AsRead>, clock: &MolaClock) -> Conve
         })
         .collect();
     let mut shifts = vec![(Vec::new(), Vec::new()); footprints.files.len()];
-    let footprints = turned(footprints, clock, |file, shift| {
+    let footprints = turned(footprints, clock, Shift::of, |file, shift| {
         let (shift_m, turn_deg) = &mut shifts[file];
         shift_m.push(shift.ground_m);
         turn_deg.push(shift.turn_rad / RADIANS_PER_DEGREE);
@@ -193,11 +193,15 @@ impl Shift {
     }
 }
 
-/// The footprints, with every shot converted from its file's datum; `record` is called with the file and the shift of each shot.
-fn turned(
+/// The footprints, with every shot converted from its file's datum.
+///
+/// `record` is called for each shot with its file and what `measure` returns for the shot and its new longitude and
+/// latitude, radians; with the default value for a shot that is not converted.
+fn turned<M: Default + Send>(
     footprints: Footprints<AsRead>,
     clock: &MolaClock,
-    mut record: impl FnMut(usize, Shift),
+    measure: impl Fn(&Footprint, (f64, f64)) -> M + Sync,
+    mut record: impl FnMut(usize, M),
 ) -> Footprints<BodyFixed> {
     let datums = footprints.files.iter();
     let datums: Vec<DatumTurn> = datums
@@ -208,21 +212,23 @@ fn turned(
     for start in (0..rows).step_by(ROWS_AT_ONCE) {
         let rows = start..rows.min(start + ROWS_AT_ONCE);
         let moved = rows.clone().into_par_iter().map(|row| {
-            let shot = converted.row(row);
-            let moved = datums[usize::from(shot.file)].moved(&shot)?;
-            Some((moved, Shift::of(&shot, moved[0])))
+            let datum = &datums[usize::from(converted.file[row])];
+            // A row is not gathered from its columns in vain.
+            let shot = (!datum.is_none()).then(|| converted.row(row))?;
+            let moved = datum.moved(&shot)?;
+            Some((moved, measure(&shot, moved[0])))
         });
-        let moved: Vec<Option<(Places, Shift)>> = moved.collect();
+        let moved: Vec<Option<(Places, M)>> = moved.collect();
         for (row, moved) in rows.zip(moved) {
-            let shift = moved.map_or_else(Shift::default, |([ground, spacecraft], shift)| {
+            let measured = moved.map_or_else(M::default, |([ground, spacecraft], measured)| {
                 (converted.longitude_rad[row], converted.latitude_rad[row]) = ground;
                 (
                     converted.spacecraft_longitude_rad[row],
                     converted.spacecraft_latitude_rad[row],
                 ) = spacecraft;
-                shift
+                measured
             });
-            record(usize::from(converted.file[row]), shift);
+            record(usize::from(converted.file[row]), measured);
         }
     }
     converted
@@ -318,7 +324,7 @@ pub fn convert_at_tags(
         scope: BiasScope::None,
         source: String::new(),
     };
-    turned(footprints, &at_tags, |_, _| {})
+    turned(footprints, &at_tags, |_, _| (), |_, ()| ())
 }
 
 fn note(body: Body, name: &str, datum: Datum, turn_s: Option<f64>) -> String {

@@ -85,15 +85,6 @@ pub(crate) static IMAGES: Declaration = Declaration {
     uses: &[],
 };
 
-/// UTC of the newest shot, or of the first image without shots: a clock would give different bytes each time.
-pub(super) fn newest_utc(site: &SiteProducts) -> String {
-    let first = site.images.first();
-    match (site.utc.is_empty(), first) {
-        (true, Some(image)) => image.times.utc_start.clone(),
-        _ => site.newest_utc(),
-    }
-}
-
 /// The tie points of a site with their adjustment.
 struct Joined<'a> {
     site: &'a SiteProducts<'a>,
@@ -211,7 +202,7 @@ impl<'a> Joined<'a> {
             id: &self.site.config.site,
             body: self.site.config.body,
             description,
-            created_utc: newest_utc(self.site),
+            created_utc: self.site.newest_utc(),
             points: self.ties.iter().enumerate().map(point).collect(),
         }
     }

@@ -3,7 +3,6 @@
 use super::{
     adjusted::isis_name,
     control_network::{ControlNetwork, NetworkMeasure, NetworkPoint, write_control_network},
-    jigsaw::newest_utc,
     points::ImageMeasure,
 };
 use crate::{
@@ -113,7 +112,7 @@ fn network<'a>(
         id: &site.config.site,
         body: site.config.body,
         description: "tie points matched by areograph".to_owned(),
-        created_utc: newest_utc(site),
+        created_utc: site.newest_utc(),
         points: points.collect(),
     }
 }

@@ -117,8 +117,8 @@ impl Stage for CheckRanges<'_> {
     }
 }
 
-/// Profiles that are checked at once.
-const PROFILES_AT_ONCE: usize = 16;
+/// Profiles that are checked at once, for each thread.
+const PROFILES_OF_A_THREAD: usize = 8;
 /// Seconds of trajectory beyond the reach of the scan of the clock bias.
 const TRAJECTORY_MARGIN_S: f64 = 0.5;
 /// The tabulated trajectory stays this close to the kernels, metres: a tenth of a PEDR centimetre.
@@ -295,11 +295,10 @@ pub fn check_ranges<'a>(
     let mut shots = ShotResiduals::default();
     let mut checked = Vec::with_capacity(profiles.len());
     // Profiles are checked in waves: only the residuals of one wave are held twice.
-    for start in (0..profiles.len()).step_by(PROFILES_AT_ONCE) {
-        let wave = profiles.iter().enumerate().skip(start);
-        let wave: Vec<(usize, &Profile)> = wave.take(PROFILES_AT_ONCE).collect();
+    let numbered: Vec<(usize, &Profile)> = profiles.iter().enumerate().collect();
+    for wave in numbered.chunks(PROFILES_OF_A_THREAD * rayon::current_num_threads()) {
         let found: Vec<Result<(ShotResiduals, ProfileRanges)>> =
-            wave.into_par_iter().map(check).collect();
+            wave.par_iter().copied().map(check).collect();
         for found in found {
             let (of_profile, ranges) = found?;
             shots.append(of_profile);
