@@ -31,7 +31,7 @@ use crate::{
         check_profiles::CheckProfiles,
         check_ranges::{CheckRanges, CheckTableRanges},
         compare_pairs::ComparePairs,
-        convert_datum::{ConvertDatum, FoundShots},
+        convert_datum::ConvertDatum,
         describe_kernels::{DescribeKernels, Required},
         fit_sensor_model::FitSensorModel,
         group_profiles::GroupProfiles,
@@ -155,12 +155,9 @@ pub(super) fn prepare<D: SiteDriver>(flow: &mut D, config: &SiteConfig) -> Flow<
         };
         config.images.iter().map(tag).collect::<Flow<Vec<_>>>()?
     };
-    let mut found = found(flow, config, &images, clocks.as_ref())?;
-    let shots = found
-        .take_rows(|found| std::mem::replace(&mut found.footprints, Footprints::new(Vec::new())));
+    let found = found(flow, config, &images, clocks.as_ref())?;
     let converted = flow.stage(&ConvertDatum {
         found: &found,
-        shots: FoundShots::of(shots),
         altimeter_clock: &config.altimeter_clock,
         ground: &config.pedr.crossover,
     })?;

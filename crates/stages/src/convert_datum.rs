@@ -1,6 +1,6 @@
 //! Conversion of footprints and the file's own spacecraft positions from the file's datum to the frame of the products.
 
-use std::sync::{Mutex, PoisonError, atomic::AtomicBool};
+use std::sync::atomic::AtomicBool;
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -9,7 +9,7 @@ use super::search_footprints::SearchResult;
 use areograph_base::{
     altimetry::{BiasScope, GroundRadius, MolaClock, TagSign},
     body::{Body, Datum},
-    error::{Cause, Result},
+    error::Result,
     footprints::{AsRead, Footprint, Footprints, SourceFile},
     frames::BodyFixed,
     time::Et,
@@ -21,7 +21,7 @@ use areograph_geom::{
     statistics::Summary,
 };
 use areograph_store::{
-    stage::{Input, Inputs, Output, Stage},
+    stage::{Output, Stage},
     stage_inputs,
 };
 
@@ -52,52 +52,11 @@ stage_inputs! {
     pub struct ConvertDatum<'a> {
         /// Results of the search.
         pub found: &'a Output<SearchResult>,
-        /// The shots, if they were taken out of `found`.
-        pub shots: FoundShots,
         /// The clock of MOLA.
         pub altimeter_clock: &'a MolaClock,
         /// The radius of the ground.
         pub ground: &'a GroundRadius,
     }
-}
-
-/// Shots taken out of the results of a search, so that they are converted in place: a million shots occupy 0.2 GB.
-#[derive(Debug)]
-pub struct FoundShots {
-    were_taken: bool,
-    shots: Mutex<Option<Footprints<AsRead>>>,
-}
-
-/// A second conversion of shots that were converted in place.
-#[derive(Debug, thiserror::Error, Cause)]
-#[error("the shots of the search were converted already")]
-#[cause(Bug: "this is a bug in areograph; please report it with the configuration")]
-struct ConvertedAlready;
-
-impl FoundShots {
-    /// These shots; `None` if the results still have them.
-    #[must_use]
-    pub const fn of(shots: Option<Footprints<AsRead>>) -> Self {
-        Self {
-            were_taken: shots.is_some(),
-            shots: Mutex::new(shots),
-        }
-    }
-
-    /// The shots, once; otherwise a copy of the shots in `found`.
-    fn take(&self, found: &Output<SearchResult>) -> Result<Footprints<AsRead>> {
-        let mut shots = self.shots.lock().unwrap_or_else(PoisonError::into_inner);
-        match shots.take() {
-            Some(shots) => Ok(shots),
-            None if self.were_taken => Err(ConvertedAlready.into()),
-            None => Ok(found.value()?.footprints.clone()),
-        }
-    }
-}
-
-/// They add no input: the fingerprint already contains the search results.
-impl Input for FoundShots {
-    fn add_to(&self, _field: &str, _inputs: &mut Inputs) {}
 }
 
 impl Stage for ConvertDatum<'_> {
@@ -108,7 +67,7 @@ impl Stage for ConvertDatum<'_> {
     stage_inputs!(fingerprint);
 
     fn run(&self, _stop: &AtomicBool) -> Result<Converted> {
-        let mut footprints = self.shots.take(self.found)?;
+        let mut footprints = self.found.value()?.footprints.clone();
         footprints.ground = *self.ground;
         let choice = footprints.ground_choice();
         let mut converted = convert_datum(footprints, self.altimeter_clock);

@@ -314,16 +314,6 @@ mod tests {
         let loaded = load();
         assert_eq!(loaded.provenance(), stored.provenance());
         assert_eq!(loaded.value().unwrap(), &heights);
-        let mut unread = load();
-        let take = |heights: &mut Vec<u32>| heights.split_off(3);
-        assert_eq!(unread.take_rows(take), None);
-        assert_eq!(unread.value().unwrap(), &heights);
-        let shared = unread.clone();
-        assert_eq!(unread.take_rows(take), None);
-        drop(shared);
-        assert_eq!(unread.take_rows(take).unwrap(), heights[3..]);
-        assert_eq!(unread.value().unwrap(), &[0, 1, 2]);
-        assert_eq!(unread.provenance(), stored.provenance());
         let fewer = load().without_rows(|heights| heights.truncate(3));
         assert_eq!(fewer.value().unwrap(), &[0, 1, 2]);
         // One bit, after the output was examined and before it is used.

@@ -125,12 +125,6 @@ impl<T> Output<T> {
         self
     }
 
-    /// Takes rows out of the value and keeps its origin; `None` if the value is shared or not in memory.
-    pub fn take_rows<R>(&mut self, take: fn(&mut T) -> R) -> Option<R> {
-        let known = Arc::get_mut(self.known.as_mut()?)?;
-        known.value.get_mut()?.as_mut().map(take)
-    }
-
     /// Label of the stage, for example `register/E02-00665`.
     #[must_use]
     pub fn label(&self) -> &str {
