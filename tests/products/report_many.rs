@@ -83,7 +83,7 @@ fn the_page_of_many_images_is_made_again_from_its_data() {
     );
     // The same if footprints are inside images without plots alone.
     let copies = 2 * IMAGES_SHOWN;
-    let shown = site.with_copies(copies, SiteProducts::shown_images);
+    let shown = site.with_copies(copies, |site| site.shown_images());
     let hide = |index: usize, registration: &mut ImageRegistration| {
         if shown.binary_search(&index).is_ok() {
             registration.points.inside.fill(false);
