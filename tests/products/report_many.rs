@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may fail loudly")]
 
+use std::collections::BTreeSet;
+
 use crate::common::{page::assert_complete, products_site as fixture};
 
 use areograph::{
@@ -83,9 +85,11 @@ fn the_page_of_many_images_is_made_again_from_its_data() {
     );
     // The same if footprints are inside images without plots alone.
     let copies = 2 * IMAGES_SHOWN;
-    let shown = site.with_copies(copies, |site| site.shown_images());
+    let shown = site.with_copies(copies, |site| -> BTreeSet<usize> {
+        site.shown_images().into_iter().collect()
+    });
     let hide = |index: usize, registration: &mut ImageRegistration| {
-        if shown.binary_search(&index).is_ok() {
+        if shown.contains(&index) {
             registration.points.inside.fill(false);
             for profile in &mut registration.profiles {
                 profile.inside = 0;
