@@ -79,6 +79,9 @@ struct MissionArguments {
     /// With --realistic: one offset of the attitude's clock for all images instead of line times of each.
     #[arg(long, requires = "realistic")]
     attitude_clock: bool,
+    /// Further laser passes over each site of narrow-angle images, on days without an image.
+    #[arg(long, value_name = "COUNT", default_value_t = 0)]
+    passes: u32,
     /// Also render the narrow-angle images, `images/*.imq`, which takes minutes.
     #[arg(long)]
     images: bool,
@@ -238,6 +241,7 @@ fn mission(arguments: &MissionArguments) -> Result<(), Error> {
     let options = SceneOptions {
         seed: *seed,
         day_s: arguments.day_s,
+        passes: arguments.passes,
         errors: arguments.errors(),
     };
     output::line(if arguments.images {

@@ -24,6 +24,7 @@ use areograph::{
 const SHORT: SceneOptions = SceneOptions {
     seed: 3,
     day_s: 1_800.0,
+    passes: 0,
     errors: SceneErrors::demo(),
 };
 

@@ -137,6 +137,7 @@ fn file(change: impl Fn(&mut Vec<Record>)) -> File {
     let options = SceneOptions {
         seed: 3,
         day_s: 600.0,
+        passes: 0,
         errors: SceneErrors::demo(),
     };
     write_scene(&scene, &options).unwrap();

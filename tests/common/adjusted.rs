@@ -36,6 +36,7 @@ static MISSION: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
     let options = SceneOptions {
         seed: 5,
         day_s: 1_800.0,
+        passes: 0,
         errors: SceneErrors::demo(),
     };
     write_scene(&folder.path().join("mission"), &options).unwrap();

@@ -196,6 +196,7 @@ fn matched_ties_of_realistic_images_are_kept_and_heights_scatter_as_stated() {
         let ground = TrueGround::of(&SceneOptions {
             seed: seed.into(),
             day_s: 600.0,
+            passes: 0,
             errors: SceneErrors::realistic(roughness),
         });
         let mut run = areograph();

@@ -71,6 +71,7 @@ impl Mission {
         let options = SceneOptions {
             seed,
             day_s: 600.0,
+            passes: 0,
             errors,
         };
         write_scene(&folder.path().join("mission"), &options).unwrap();

@@ -39,6 +39,7 @@ use serde_json::Value;
 const SHORT: SceneOptions = SceneOptions {
     seed: 3,
     day_s: 1_800.0,
+    passes: 0,
     errors: SceneErrors::demo(),
 };
 

@@ -23,7 +23,7 @@ use areograph_geom::{
 };
 
 /// Kernels reach this far beyond the frames, seconds.
-const KERNEL_MARGIN_S: f64 = 60.0;
+pub(super) const KERNEL_MARGIN_S: f64 = 60.0;
 /// Maximum number of Newton steps.
 const ITERATIONS_MAX: u32 = 40;
 /// A Newton step below this ends the iteration, radians: 0.4 µm on the ground.

@@ -6,8 +6,9 @@ use std::{
 };
 
 use super::{
-    arc::Arc,
+    arc::{Arc, KERNEL_MARGIN_S},
     files::put,
+    further_passes::FurtherPass,
     orbit::Orbit,
     plan::PlannedImage,
     sun::mars_state_from_sun,
@@ -200,28 +201,60 @@ pub(super) fn write_attitude(folder: &Path, session: &Session, arcs: &[Arc]) -> 
     write_ck(&folder.join(CK_NAME), session, &segments, &comment)
 }
 
-/// Writes one SPK per family and one for Mars and the Sun.
-pub(super) fn write_orbits(folder: &Path, arcs: &[Arc], seed: u64) -> Result<()> {
+/// An orbit with its rival versions over some time.
+pub(super) struct Flightpath<'a> {
+    name: String,
+    orbit: &'a Orbit,
+    /// What kernels cover.
+    span: Interval,
+    versions: [Version; 3],
+}
+
+impl<'a> Flightpath<'a> {
+    /// The day of an image.
+    pub(super) fn of_arc(arc: &'a Arc, seed: u64) -> Self {
+        Self {
+            name: arc.image.id.to_owned(),
+            orbit: &arc.orbit,
+            span: arc.kernel_span(),
+            versions: versions(arc, seed),
+        }
+    }
+
+    /// A further pass.
+    pub(super) fn of_pass(pass: &'a FurtherPass, seed: u64) -> Self {
+        let name = pass.file();
+        Self {
+            orbit: pass.orbit(),
+            span: pass.frames().padded(KERNEL_MARGIN_S),
+            versions: FAMILIES.map(|family| Version::new(family, &name, seed, pass.middle)),
+            name,
+        }
+    }
+}
+
+/// Writes one SPK per family and one for Mars and the Sun, of paths in order of time.
+pub(super) fn write_orbits(folder: &Path, paths: &[Flightpath<'_>]) -> Result<()> {
     for (index, family) in FAMILIES.iter().enumerate() {
-        let tables: Vec<(Vec<Et>, Vec<State>)> = arcs
+        let tables: Vec<(Vec<Et>, Vec<State>)> = paths
             .iter()
-            .map(|arc| {
-                let version = &versions(arc, seed)[index];
-                let epochs = epochs(arc.kernel_span(), SPK_STEP_S);
+            .map(|path| {
+                let version = &path.versions[index];
+                let epochs = epochs(path.span, SPK_STEP_S);
                 let states = epochs
                     .iter()
-                    .map(|et| kernel_state(&version.state(&arc.orbit, *et)))
+                    .map(|et| kernel_state(&version.state(path.orbit, *et)))
                     .collect();
                 (epochs, states)
             })
             .collect();
-        let segments: Vec<SpkSegment> = arcs
+        let segments: Vec<SpkSegment> = paths
             .iter()
             .zip(&tables)
-            .map(|(arc, (epochs, states))| SpkSegment {
+            .map(|(path, (epochs, states))| SpkSegment {
                 target: SPACECRAFT.naif,
                 centre: NAIF_MARS_BARYCENTRE,
-                name: arc.image.id,
+                name: &path.name,
                 degree: SPK_DEGREE,
                 epochs,
                 states,
@@ -231,10 +264,10 @@ pub(super) fn write_orbits(folder: &Path, arcs: &[Arc], seed: u64) -> Result<()>
             format!("{SYNTHETIC}\nOrbit of family {family}; family gsfc is the true orbit.");
         write_spk(&folder.join(spk_name(family)), &segments, &comment)?;
     }
-    match (arcs.first(), arcs.last()) {
+    match (paths.first(), paths.last()) {
         (Some(first), Some(last)) => {
-            let span = Interval::new(first.frames.start, last.frames.stop);
-            write_planets(folder, span)
+            let span = Interval::new(first.span.start, last.span.stop);
+            write_planets(folder, span.padded(-KERNEL_MARGIN_S))
         }
         _ => Ok(()),
     }

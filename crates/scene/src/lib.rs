@@ -7,6 +7,7 @@
 //! | `orbit`, `versions` | the true orbit of a day, and two rivals with errors of metres |
 //! | `attitude`, `arc` | pointing, and orbit and attitude solved so that an image shows its site |
 //! | `terrain`, `roughness`, `laser` | the ground, and laser shots on it in PEDR frames |
+//! | `further_passes` | laser passes on days without an image |
 //! | `images` | the six images, pixel by pixel |
 //! | `context` | wide-angle images around two of the six, a fourth site |
 //! | `telemetry` | echo data of the instrument besides ranges |
@@ -43,6 +44,7 @@ mod drawn;
 mod error;
 mod error_sources;
 mod files;
+mod further_passes;
 mod images;
 mod kernels;
 mod laser;
@@ -96,16 +98,19 @@ pub struct SceneOptions {
     pub seed: u64,
     /// Seconds of frames in the files of full days, 600 to 90 000; other files hold at most one revolution.
     pub day_s: f64,
+    /// Further laser passes over each site of narrow-angle images, on days without an image.
+    pub passes: u32,
     /// Errors of the data, and the relief.
     pub errors: SceneErrors,
 }
 
 impl Default for SceneOptions {
-    /// Seed 1, days of 24 h, errors of the worked example.
+    /// Seed 1, days of 24 h, no further passes, errors of the worked example.
     fn default() -> Self {
         Self {
             seed: 1,
             day_s: areograph_base::units::SECONDS_PER_DAY,
+            passes: 0,
             errors: SceneErrors::demo(),
         }
     }

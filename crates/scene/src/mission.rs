@@ -9,9 +9,10 @@ use super::{
     drawn::{DayErrors, Flown},
     error::SceneError,
     files::{Draft, put},
+    further_passes::FurtherPass,
     images::{Coder, write_images},
     kernels::{
-        clock_session, image_start, versions, write_attitude, write_orbits, write_text_kernels,
+        Flightpath, clock_session, image_start, versions, write_attitude, write_orbits, write_text_kernels,
     },
     laser::{LaserErrors, Shot},
     pedr::{PedrRequest, frame_tags, write_pedr},
@@ -25,8 +26,9 @@ use super::{
     },
 };
 use areograph_base::{
-    body::MARS_IAU2000,
+    body::{Datum, MARS_IAU2000},
     error::{IoError, Locate, Result},
+    time::Et,
 };
 use areograph_geom::{body_rotation::body_matrix, ellipsoid::Spherical};
 use areograph_pds::ties::ties_table;
@@ -94,10 +96,8 @@ pub(super) fn write(
         let errors = DayErrors::draw(&options.errors, &arc, options.seed);
         Flown { arc, errors }
     };
-    let days: Vec<Flown> = write_kernels(&draft, options)?
-        .into_iter()
-        .map(fly)
-        .collect();
+    let (arcs, passes) = write_kernels(&draft, options)?;
+    let days: Vec<Flown> = arcs.into_iter().map(fly).collect();
 
     let TrueGround(terrain) = TrueGround::of(options);
     let mut truth = Truth::new(options.seed, &options.errors);
@@ -114,6 +114,11 @@ pub(super) fn write(
             truth.profiles.push(day.profile);
         }
     }
+    for pass in &passes {
+        let (file, profile) = write_pass(&pedr, pass, &terrain, options)?;
+        truth.files.push(file);
+        truth.profiles.push(profile);
+    }
     let sites = draft.folder("sites")?;
     let ties = draft.folder("ties")?;
     for site in SITES {
@@ -126,7 +131,11 @@ pub(super) fn write(
             let pair = write_ties(&ties, [first, second], &terrain, noise, options.seed)?;
             let arcs = [&first.arc, &second.arc];
             let has_pixels = images.is_some_and(|(_, sites)| is_of(site, sites));
-            let file = planned_site(site, arcs, &options.errors, &pair, has_pixels);
+            let passes: Vec<&FurtherPass> = passes
+                .iter()
+                .filter(|pass| pass.site.id == site.id)
+                .collect();
+            let file = planned_site(site, arcs, &passes, &options.errors, &pair, has_pixels);
             put(&sites.join(format!("{}.toml", site.id)), &file.to_toml())?;
             truth.ties.push(pair);
         }
@@ -216,8 +225,8 @@ pub(super) fn write_truth(draft: &Draft, truth: &Truth) -> Result<()> {
     put(&path, &text)
 }
 
-/// Solves the arcs and writes their kernels, and labels of the delivered images.
-fn write_kernels(draft: &Draft, options: &SceneOptions) -> Result<Vec<Arc>> {
+/// Solves the arcs and writes their kernels, those of further passes, and labels of the delivered images.
+fn write_kernels(draft: &Draft, options: &SceneOptions) -> Result<(Vec<Arc>, Vec<FurtherPass>)> {
     let kernels = draft.folder("kernels")?;
     let labels = draft.folder("labels")?;
     write_text_kernels(&kernels)?;
@@ -244,8 +253,43 @@ fn write_kernels(draft: &Draft, options: &SceneOptions) -> Result<Vec<Arc>> {
     }
     write_attitude(&kernels, &session, &arcs)?;
     drop(session);
-    write_orbits(&kernels, &arcs, options.seed)?;
-    Ok(arcs)
+    let last = arcs.last().map_or_else(|| Et::from_seconds(0.0), |arc| arc.frames.stop);
+    let passes = FurtherPass::over(&SITES, options.passes, last, &options.errors, options.seed);
+    let of_arcs = arcs.iter().map(|arc| Flightpath::of_arc(arc, options.seed));
+    let of_passes = passes
+        .iter()
+        .map(|pass| Flightpath::of_pass(pass, options.seed));
+    let paths: Vec<Flightpath<'_>> = of_arcs.chain(of_passes).collect();
+    write_orbits(&kernels, &paths)?;
+    Ok((arcs, passes))
+}
+
+/// Writes the PEDR file of a further pass.
+fn write_pass(
+    folder: &Path,
+    pass: &FurtherPass,
+    terrain: &Terrain,
+    options: &SceneOptions,
+) -> Result<(FileTruth, ProfileTruth)> {
+    let name = pass.file();
+    let request = PedrRequest {
+        name: &name,
+        tags: &frame_tags(pass.frames()),
+        datum: Datum::Iau2000,
+        orbit: &|_| pass.orbit_number(),
+        seed: options.seed ^ u64::from(pass.number),
+        errors: LaserErrors {
+            altimeter: options.errors.altimeter,
+            shift: pass.shift.clone(),
+        },
+    };
+    let (file, kept) = write_pedr(folder, pass, terrain, &request, |shot| {
+        let ground = Spherical::from_xyz_m(&shot.ground_m);
+        pass.site.contains(ground.longitude_rad, ground.latitude.0)
+    })?;
+    let mut profile = ProfileTruth::new(pass.site.id, &name, &kept);
+    profile.profile_shift = Some(pass.shift.clone());
+    Ok((file, profile))
 }
 
 /// Output of one day.

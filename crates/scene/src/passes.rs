@@ -81,7 +81,8 @@ impl Passes {
 }
 
 /// A pass with nadir pointing.
-struct Pass(Orbit);
+#[derive(Debug)]
+pub(super) struct Pass(Orbit);
 
 impl Flight for Pass {
     fn beam(&self, et: Et) -> Result<Beam> {
@@ -97,8 +98,18 @@ impl Flight for Pass {
 }
 
 impl Pass {
+    /// Its orbit.
+    pub(super) const fn orbit(&self) -> &Orbit {
+        &self.0
+    }
+
+    /// Height above the sphere of passes at `et`, metres.
+    pub(super) fn height_m(&self, et: Et) -> f64 {
+        self.0.state(et).position_m.norm() - RADIUS_M
+    }
+
     /// The northbound or southbound pass that is over a site at `et`.
-    fn over(et: Et, longitude_rad: f64, latitude_rad: f64, northwards: bool) -> Self {
+    pub(super) fn over(et: Et, longitude_rad: f64, latitude_rad: f64, northwards: bool) -> Self {
         /// Steps of its solution: each leaves a fiftieth, the eccentricity's share.
         const STEPS: usize = 8;
         let sense = if northwards { 1.0 } else { -1.0 };

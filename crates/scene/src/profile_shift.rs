@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::{
     arc::Arc,
     error_sources::{AltimeterErrors, MISPLACED_M},
-    plan::Look,
+    plan::{Look, Site},
     random::Random,
     terrain::REFERENCE_RADIUS_M,
 };
@@ -59,7 +59,44 @@ impl ProfileShift {
         seed: u64,
     ) -> Self {
         let site = arc.image.site.direction();
+        let beam = MiddleBeam::of(arc, &site);
+        let [at_nadir, off_nadir] = sizes.attitude_share_max;
+        let share_max = match arc.image.look {
+            Look::Nadir => at_nadir,
+            Look::Roll { .. } => off_nadir,
+        };
+        let moved = Moved {
+            by_attitude_m: beam.moved_m(turn_rad),
+            outward: beam.outward,
+            share_max,
+        };
         let mut random = Random::new(seed, &format!("profile {}", arc.image.id));
+        Self::drawn(sizes, &site, &moved, &mut random)
+    }
+
+    /// Draws the shift of a pass at nadir over `site`.
+    ///
+    /// * `aside_m` – displacement of the end of the beam by the attitude error, IAU 2000
+    pub(super) fn of_pass(
+        sizes: &AltimeterErrors,
+        site: &Site,
+        aside_m: &Vector3<f64>,
+        random: &mut Random,
+    ) -> Self {
+        let moved = Moved {
+            by_attitude_m: *aside_m,
+            outward: Vector3::zeros(),
+            share_max: sizes.attitude_share_max[0],
+        };
+        Self::drawn(sizes, &site.direction(), &moved, random)
+    }
+
+    fn drawn(
+        sizes: &AltimeterErrors,
+        site: &Vector3<f64>,
+        moved: &Moved,
+        random: &mut Random,
+    ) -> Self {
         let [mut east_m, mut north_m] = [0, 1].map(|_| sizes.plan_sigma_m * random.normal());
         let mut radial_m = sizes.radial_sigma_m * random.normal();
         let is_misplaced = random.between(0.0, 1.0) < sizes.misplaced_chance;
@@ -69,22 +106,16 @@ impl ProfileShift {
             let (sin, cos) = random.between(0.0, std::f64::consts::TAU).sin_cos();
             (east_m, north_m) = (east_m + away_m * sin, north_m + away_m * cos);
         }
-        let east = Vector3::z().cross(&site).normalize();
+        let east = Vector3::z().cross(site).normalize();
         let north = site.cross(&east);
-        let beam = MiddleBeam::of(arc, &site);
-        let [at_nadir, off_nadir] = sizes.attitude_share_max;
-        let most = match arc.image.look {
-            Look::Nadir => at_nadir,
-            Look::Roll { .. } => off_nadir,
-        };
         // The files' coordinates lie where the attitude of the kernels has the beam.
-        let moved_m = -random.between(0.0, most) * beam.moved_m(turn_rad);
+        let moved_m = -random.between(0.0, moved.share_max) * moved.by_attitude_m;
         east_m += moved_m.dot(&east);
         north_m += moved_m.dot(&north);
-        radial_m += beam.outward.dot(&(east_m * east + north_m * north));
+        radial_m += moved.outward.dot(&(east_m * east + north_m * north));
         Self {
             is_misplaced,
-            ..Self::near(&site, [east_m, north_m, radial_m])
+            ..Self::near(site, [east_m, north_m, radial_m])
         }
     }
 
@@ -103,6 +134,16 @@ impl ProfileShift {
         let radius_m = ground_m.norm();
         self.rotation * ground_m * ((radius_m + self.radial_m()) / radius_m)
     }
+}
+
+/// Errors of a beam that coordinates of files contain in part.
+struct Moved {
+    /// Displacement of its end by the attitude error, IAU 2000, metres.
+    by_attitude_m: Vector3<f64>,
+    /// Horizontal part of its direction over the vertical one, IAU 2000.
+    outward: Vector3<f64>,
+    /// Largest share of the displacement that coordinates contain.
+    share_max: f64,
 }
 
 /// The beam in the middle of an image, according to the kernels.

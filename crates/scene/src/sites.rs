@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use super::{
     arc::Arc,
     error_sources::SceneErrors,
+    further_passes::FurtherPass,
     images::image_name,
     plan::{Look, Site},
     ties::ties_name,
@@ -179,11 +180,12 @@ pub(super) fn window(site: &Site, [east_deg, north_deg]: [f64; 2]) -> Window {
     }
 }
 
-/// The site file of `site`, with the images and PEDR files of its arcs and the tie points of `ties`; the images may
+/// The site file of `site`, with the images and PEDR files of its arcs, further passes, and the tie points of `ties`; the images may
 /// have pixels.
 pub(super) fn planned_site<'a>(
     site: &'a Site,
     arcs: [&Arc; 2],
+    passes: &[&FurtherPass],
     errors: &SceneErrors,
     ties: &TiesTruth,
     has_pixels: bool,
@@ -216,7 +218,9 @@ pub(super) fn planned_site<'a>(
         kernels: SiteKernels::Metakernel("../kernels/nav.tm".to_owned()),
         pedr: arcs
             .iter()
-            .map(|arc| format!("../pedr/{}", arc.image.pedr_name()))
+            .map(|arc| arc.image.pedr_name())
+            .chain(passes.iter().map(|pass| pass.file()))
+            .map(|file| format!("../pedr/{file}"))
             .collect(),
         ties: Some(SiteTies {
             file: format!("../ties/{}", ties_name(site.id)),
@@ -350,7 +354,8 @@ pub(super) const README: &str = "\
 kernels/     text kernels; orbit (three rival versions), attitude, Mars and Sun as binary kernels;
              nav.tm, gsfc.tm and ipng.tm load one version of the orbit each with all other kernels; nav_wa.tm,
              gsfc_wa.tm and ipng_wa.tm also load the frames of the wide-angle cameras
-pedr/        MOLA PEDR files: two whole days, five single revolutions; version K refers to IAU 1991, L to IAU 2000
+pedr/        MOLA PEDR files: two whole days, five single revolutions; version K refers to IAU 1991, L to IAU 2000;
+             from ap20001l.b on, with --passes only: further passes over the sites
 images/      with --images only: the six narrow-angle images, as in the archive
 labels/      labels of six narrow-angle and three wide-angle images
 ties/        tie points measured in both images of a site; some are blunders

@@ -10,6 +10,7 @@ use super::{
     error_sources::SceneErrors,
     laser::{CROSSOVER_AMPLITUDE_M, CROSSOVER_PERIOD_S, Shot},
     plan::{Look, PlannedImage},
+    profile_shift::ProfileShift,
     versions::Version,
 };
 use areograph_base::{body::MARS_IAU2000, time::Et, units::SECONDS_PER_MS};
@@ -212,6 +213,9 @@ pub(super) struct ProfileTruth {
     pub window: String,
     pub image: Option<&'static str>,
     pub file: String,
+    /// Its offset in the file, of profiles without an image; the errors of an image contain the others.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub profile_shift: Option<ProfileShift>,
     pub orbit_differences: BTreeMap<&'static str, OrbitDifference>,
     /// Largest distance between the linear frame model and the intended position of a shot in the file, metres, before
     /// rounding.
@@ -381,6 +385,7 @@ impl ProfileTruth {
             window: window.to_owned(),
             image: None,
             file: file.to_owned(),
+            profile_shift: None,
             orbit_differences: BTreeMap::new(),
             frame_error_max_m: kept
                 .iter()

@@ -238,6 +238,7 @@ impl Plan<'_> {
         let options = SceneOptions {
             seed: self.seed.into(),
             day_s: 600.0,
+            passes: 0,
             errors,
         };
         {

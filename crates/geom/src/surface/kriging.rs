@@ -1,8 +1,11 @@
 //! Ordinary kriging in plan.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector2};
+use nalgebra::{DMatrix, DVector, Vector2};
+use rayon::prelude::*;
 
-use super::{Placed, SharedErrors, Variogram, shot::PROFILE_PLAN_M};
+use super::{
+    Placed, SharedErrors, Variogram, blocked_cholesky::BlockedCholesky, shot::PROFILE_PLAN_M,
+};
 
 /// The kriging equations of some shots, factorised.
 #[derive(Debug, Clone)]
@@ -12,17 +15,13 @@ pub(super) struct Kriging {
     /// A variance above the variance of any two points: with it the equations are positive definite, and as weights sum
     /// up to 1 it has no effect.
     sill_m2: f64,
-    factor: Cholesky<f64, Dyn>,
+    factor: BlockedCholesky,
     /// The equations' solution for ones, and its sum.
     of_ones: DVector<f64>,
     /// Mean height, and the contribution of each shot to the height of a point by its covariance with it.
     mean_m: f64,
     strengths: DVector<f64>,
 }
-
-/// Rows solved at once. Most of the work is then in matrix products, which nalgebra computes faster than it solves
-/// triangular equations.
-const BLOCK: usize = 64;
 
 /// Weights of shots, one column per point, with the multiplier that keeps their sum at 1.
 pub(super) struct Weights {
@@ -56,7 +55,7 @@ impl Kriging {
         let first = shots.first()?.plan_m;
         let reach_m = shots.iter().map(|shot| (shot.plan_m - first).norm());
         let sill_m2 = 2.0 * variogram.at(2.0 * reach_m.fold(1.0, f64::max));
-        let matrix = DMatrix::from_fn(shots.len(), shots.len(), |row, column| {
+        let covariance_m2 = |row: usize, column: usize| {
             let mut noise_m2 = 0.0;
             if shots[row].profile == shots[column].profile {
                 let shared = shots[row].shared.radial * shots[column].shared.radial;
@@ -67,8 +66,16 @@ impl Kriging {
                     shot_sigma_m.powi(2) + 2.0 * variogram.at(shots[row].shared.farther_m());
             }
             sill_m2 - variogram.between(&shots[row].plan_m, &shots[column].plan_m) + noise_m2
+        };
+        let mut matrix = DMatrix::zeros(shots.len(), shots.len());
+        let columns = matrix.as_mut_slice().par_chunks_mut(shots.len());
+        columns.enumerate().for_each(|(column, values)| {
+            // The lower triangle.
+            for (row, value) in values.iter_mut().enumerate().skip(column) {
+                *value = covariance_m2(row, column);
+            }
         });
-        let factor = Cholesky::new(matrix)?;
+        let factor = BlockedCholesky::new(matrix)?;
         let of_ones = factor.solve(&DVector::repeat(shots.len(), 1.0));
         let heights_m = DVector::from_iterator(shots.len(), shots.iter().map(|shot| shot.height_m));
         let mean_m = of_ones.dot(&heights_m) / of_ones.sum();
@@ -102,12 +109,15 @@ impl Kriging {
     }
 
     pub(super) fn weights(&self, places: &[Vector2<f64>]) -> Weights {
-        let between_m2 = DMatrix::from_fn(self.shots.len(), places.len(), |shot, place| {
-            self.variogram
-                .between(&self.shots[shot].plan_m, &places[place])
+        let mut between_m2 = DMatrix::zeros(self.shots.len(), places.len());
+        let columns = between_m2.as_mut_slice().par_chunks_mut(self.shots.len());
+        columns.zip(places).for_each(|(column, place)| {
+            for (value, shot) in column.iter_mut().zip(&self.shots) {
+                *value = self.variogram.between(&shot.plan_m, place);
+            }
         });
         let mut of_shots = between_m2.map(|variogram_m2| self.sill_m2 - variogram_m2);
-        solve(self.factor.l_dirty(), &mut of_shots);
+        self.factor.solve_mut(&mut of_shots);
         let multipliers = DVector::from_iterator(
             places.len(),
             of_shots
@@ -176,54 +186,5 @@ impl Kriging {
             sum += row * factor(&shot.shared);
         }
         sums
-    }
-}
-
-/// Solves `L Lᵀ x = b` for every column of `b`, in its place; of `l` the lower triangle is read.
-///
-/// # Source
-/// Golub and Van Loan, Matrix Computations, section 3.1.4: block substitution.
-fn solve(l: &DMatrix<f64>, b: &mut DMatrix<f64>) {
-    let rows = b.nrows();
-    let starts = || (0..rows).step_by(BLOCK);
-    for start in starts() {
-        let size = BLOCK.min(rows - start);
-        let rest = start + size;
-        let (mut solved, mut below) = b.rows_range_pair_mut(start..rest, rest..rows);
-        l.view((start, start), (size, size))
-            .solve_lower_triangular_mut(&mut solved);
-        let factors = l.view((rest, start), (rows - rest, size));
-        below.gemm(-1.0, &factors, &solved, 1.0);
-    }
-    for start in starts().rev() {
-        let size = BLOCK.min(rows - start);
-        let (mut above, mut solved) = b.rows_range_pair_mut(0..start, start..start + size);
-        l.view((start, start), (size, size))
-            .tr_solve_lower_triangular_mut(&mut solved);
-        let factors = l.view((start, 0), (size, start)).transpose();
-        above.gemm(-1.0, &factors, &solved, 1.0);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn blocks_solve_as_the_whole() {
-        // One row, one block, a block and a row, several blocks with a remainder.
-        for rows in [1, 64, 65, 200] {
-            let root = DMatrix::from_fn(rows, rows, |row, column| {
-                ((row * 31 + column * 17) % 23) as f64 - 11.0
-            });
-            let matrix = &root * root.transpose() + DMatrix::identity(rows, rows) * 50.0;
-            let right = DMatrix::from_fn(rows, 7, |row, column| (row + 3 * column) as f64);
-            let factor = Cholesky::new(matrix.clone()).unwrap();
-            let mut solution = right.clone();
-            solve(factor.l_dirty(), &mut solution);
-            // Condition about 1e4 times rounding.
-            let error = (matrix * solution - &right).amax() / right.amax();
-            assert!(error < 1e-10, "{rows}: {error}");
-        }
     }
 }

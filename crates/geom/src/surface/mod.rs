@@ -33,7 +33,9 @@
 //! # Ok::<(), areograph_geom::surface::SurfaceError>(())
 //! ```
 
+mod blocked_cholesky;
 mod crossovers;
+mod fractional_power;
 mod kriging;
 mod plan;
 mod profiles;

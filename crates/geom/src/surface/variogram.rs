@@ -1,10 +1,10 @@
 //! Variation of heights with distance.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, sync::LazyLock};
 
 use nalgebra::Vector2;
 
-use super::{Placed, SurfaceOptions};
+use super::{Placed, SurfaceOptions, fractional_power::FractionalPower};
 
 /// Distance at which roughness is stated, metres: about one spacing of MOLA's shots.
 const REFERENCE_M: f64 = 300.0;
@@ -18,6 +18,9 @@ const CELL_M: f64 = 2_000.0;
 const REACH_M: f64 = 10_000.0;
 /// Weight of the roughness of all shots in the roughness of a place, in pairs of shots.
 const PRIOR_PAIRS: f64 = 20.0;
+
+/// The power of squared distances.
+static POWER: LazyLock<FractionalPower> = LazyLock::new(|| FractionalPower::new(Variogram::HURST));
 
 /// Half the mean square difference of heights at a distance: `½ ν² (d / 300 m)^(2H)`, `H = 0.7`.
 ///
@@ -36,8 +39,8 @@ impl Variogram {
 
     /// Half the mean square difference of heights between two points, m².
     pub(super) fn between(self, one: &Vector2<f64>, other: &Vector2<f64>) -> f64 {
-        let distance_m = (one - other).norm();
-        0.5 * self.roughness_m.powi(2) * (distance_m / REFERENCE_M).powf(2.0 * Self::HURST)
+        let distances = (one - other).norm_squared() / (REFERENCE_M * REFERENCE_M);
+        0.5 * self.roughness_m.powi(2) * POWER.of(distances)
     }
 
     /// The variogram at a distance.

@@ -1,0 +1,143 @@
+//! Cholesky factor of a large dense matrix, in blocks.
+
+use nalgebra::{Cholesky, DMatrix, DMatrixView, DMatrixViewMut, DVector};
+use rayon::prelude::*;
+
+/// Rows and columns of a block: nearly all work is in products of matrices, which nalgebra computes faster than it solves
+/// triangular equations.
+const BLOCK: usize = 64;
+/// Right-hand sides that one task solves.
+const COLUMNS: usize = 64;
+
+/// `L` of `A = L Lᵀ`. The same bits with any number of threads.
+///
+/// # Source
+/// Golub and Van Loan, Matrix Computations, sections 3.1.4 and 4.2.6.
+#[derive(Debug, Clone)]
+pub(super) struct BlockedCholesky {
+    /// Its lower triangle is the factor.
+    l: DMatrix<f64>,
+    /// Inverses of the blocks of its diagonal.
+    inverses: Vec<DMatrix<f64>>,
+}
+
+impl BlockedCholesky {
+    /// The factor of a symmetric matrix, whose lower triangle is read; `None` where it is not positive definite.
+    pub(super) fn new(mut matrix: DMatrix<f64>) -> Option<Self> {
+        let rows = matrix.nrows();
+        let mut inverses = Vec::with_capacity(rows.div_ceil(BLOCK));
+        for start in (0..rows).step_by(BLOCK) {
+            let size = BLOCK.min(rows - start);
+            let rest = start + size;
+            let block = matrix.view((start, start), (size, size)).into_owned();
+            let factor = Cholesky::new(block)?.unpack();
+            let mut inverse = DMatrix::identity(size, size);
+            factor.solve_lower_triangular_mut(&mut inverse);
+            matrix
+                .view_mut((start, start), (size, size))
+                .copy_from(&factor);
+            let below = matrix.view((rest, start), (rows - rest, size)) * inverse.transpose();
+            matrix
+                .view_mut((rest, start), (rows - rest, size))
+                .copy_from(&below);
+            inverses.push(inverse);
+            let columns = matrix.as_mut_slice()[rest * rows..].par_chunks_mut(BLOCK * rows);
+            columns.enumerate().for_each(|(index, columns)| {
+                let first = index * BLOCK;
+                let width = columns.len() / rows;
+                let of_columns = below.rows(first, width).transpose();
+                let from = rest + first;
+                DMatrixViewMut::from_slice(columns, rows, width)
+                    .rows_mut(from, rows - from)
+                    .gemm(
+                        -1.0,
+                        &below.rows(first, rows - from),
+                        &of_columns,
+                        1.0,
+                    );
+            });
+        }
+        Some(Self {
+            l: matrix,
+            inverses,
+        })
+    }
+
+    /// Solves `A x = b` for every column of `b`, in its place.
+    pub(super) fn solve_mut(&self, b: &mut DMatrix<f64>) {
+        let rows = b.nrows();
+        let columns = b.as_mut_slice().par_chunks_mut(COLUMNS * rows.max(1));
+        columns.for_each(|columns| {
+            let width = columns.len() / rows;
+            self.solve_columns(DMatrixViewMut::from_slice(columns, rows, width));
+        });
+    }
+
+    /// The solution of `A x = b`.
+    pub(super) fn solve(&self, b: &DVector<f64>) -> DVector<f64> {
+        let mut solution = b.clone();
+        let rows = solution.len();
+        self.solve_columns(DMatrixViewMut::from_slice(
+            solution.as_mut_slice(),
+            rows,
+            1,
+        ));
+        solution
+    }
+
+    fn solve_columns(&self, mut b: DMatrixViewMut<'_, f64>) {
+        let rows = b.nrows();
+        let blocks = || self.inverses.iter().zip((0..rows).step_by(BLOCK));
+        for (inverse, start) in blocks() {
+            let rest = start + inverse.nrows();
+            let (mut block, mut below) = b.rows_range_pair_mut(start..rest, rest..rows);
+            let solved = inverse * &block;
+            block.copy_from(&solved);
+            let factors = self.l.view((rest, start), (rows - rest, rest - start));
+            below.gemm(-1.0, &factors, &solved, 1.0);
+        }
+        for (inverse, start) in blocks().rev() {
+            let size = inverse.nrows();
+            let (mut above, mut block) = b.rows_range_pair_mut(0..start, start..start + size);
+            let solved = inverse.transpose() * &block;
+            block.copy_from(&solved);
+            let factors: DMatrixView<'_, f64> = self.l.view((start, 0), (size, start));
+            above.gemm(-1.0, &factors.transpose(), &solved, 1.0);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_solve_as_the_whole() {
+        // One row, one block, a block and a row, several blocks with a remainder; right-hand sides for one task and two.
+        for (rows, columns) in [(1, 1), (64, 7), (65, 64), (200, 65)] {
+            let root = DMatrix::from_fn(rows, rows, |row, column| {
+                ((row * 31 + column * 17) % 23) as f64 - 11.0
+            });
+            let matrix = &root * root.transpose() + DMatrix::identity(rows, rows) * 50.0;
+            let right = DMatrix::from_fn(rows, columns, |row, column| (1 + row + 3 * column) as f64);
+            let factor = BlockedCholesky::new(matrix.clone()).unwrap();
+            let mut solution = right.clone();
+            factor.solve_mut(&mut solution);
+            // Condition about 1e4 times rounding.
+            let error = (&matrix * solution - &right).amax() / right.amax();
+            assert!(error < 1e-10, "{rows}: {error}");
+            let only = right.column(0).into_owned();
+            let error = (&matrix * factor.solve(&only) - &only).amax() / right.amax();
+            assert!(error < 1e-10, "{rows}: {error}");
+        }
+    }
+
+    #[test]
+    fn a_matrix_that_is_not_positive_definite_has_no_factor() {
+        for wrong in [-1.0, 0.0, f64::NAN] {
+            let mut matrix = DMatrix::identity(130, 130);
+            matrix[(100, 100)] = wrong;
+            assert!(BlockedCholesky::new(matrix).is_none(), "{wrong}");
+        }
+    }
+}
