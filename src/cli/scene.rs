@@ -79,8 +79,8 @@ struct MissionArguments {
     /// With --realistic: one offset of the attitude's clock for all images instead of line times of each.
     #[arg(long, requires = "realistic")]
     attitude_clock: bool,
-    /// Further laser passes over each site of narrow-angle images, on days without an image.
-    #[arg(long, value_name = "COUNT", default_value_t = 0)]
+    /// Further laser passes over each site of narrow-angle images, on days without an image, 0 to 1000.
+    #[arg(long, value_name = "COUNT", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=1000))]
     passes: u32,
     /// Also render the narrow-angle images, `images/*.imq`, which takes minutes.
     #[arg(long)]

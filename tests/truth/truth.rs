@@ -21,6 +21,7 @@ mod light_time;
 mod misregistration;
 mod orbit;
 mod overlays;
+mod profiles;
 mod relief;
 mod shared_errors;
 mod stated;

@@ -23,8 +23,8 @@ declare_table! {
         /// error becomes a height error. The default combines 110 m for the images and 70 m for MOLA.
         plan_sigma_m: f64 = key(zero_or(1e-3, 1e5)).or(SurfaceOptions::default().plan_sigma_m),
         /// Standard deviation of the plan position of a profile, per axis (100 m horizontally for MOLA, Neumann et al.
-        /// 2001). The stated accuracies of footprints include this value, which also weights profiles where
-        /// `adjustment.relief_for_plan` or `adjustment.common_bus` is "yes".
+        /// 2001). The stated accuracies of footprints include this value, which the test for misplaced profiles uses and
+        /// which weights profiles where `adjustment.relief_for_plan` or `adjustment.common_bus` is "yes".
         profile_plan_sigma_m: f64 = key(from_to(1e-3, 1e5)).or(70.0),
         /// Lower limit of the roughness estimated from the shots: root mean square difference of heights 300 m apart.
         roughness_min_m: f64 = key(from_to(0.01, 1e4)).or(SurfaceOptions::default().roughness_min_m),
@@ -40,7 +40,8 @@ impl MolaSurfaceConfig {
             profile_sigma_m: self.profile_sigma_m,
             plan_sigma_m: self.plan_sigma_m,
             roughness_min_m: self.roughness_min_m,
-            relief_sigma_m: None,
+            profile_plan_sigma_m: self.profile_plan_sigma_m,
+            uses_relief: false,
             body,
         }
     }

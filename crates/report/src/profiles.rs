@@ -153,6 +153,8 @@ fn left_out(check: &ProfileCheck) -> Markup {
             Column::Text("profiles that it crosses"),
             Column::Number("above them (m)"),
             Column::Number("σ (m)"),
+            Column::Number("misfit"),
+            Column::Text("reason"),
         ],
     );
     for (index, profile) in check.left_out.iter().enumerate() {
@@ -165,6 +167,13 @@ fn left_out(check: &ProfileCheck) -> Markup {
                 profile.others.join(", ").into(),
                 Cell::from(label(profile.above_m, 1)).traced("/above_m"),
                 Cell::from(label(profile.sigma_m, 1)).traced("/sigma_m"),
+                Cell::from(label(profile.misfit, 1)).traced("/misfit"),
+                if profile.misplaced {
+                    "misplaced"
+                } else {
+                    "above or below"
+                }
+                .into(),
             ],
         );
     }

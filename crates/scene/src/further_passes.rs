@@ -9,6 +9,7 @@ use super::{
     plan::Site,
     profile_shift::ProfileShift,
     random::Random,
+    versions::{FAMILIES, Version},
 };
 use areograph_base::{
     body::MARS_IAU2000,
@@ -64,13 +65,7 @@ impl FurtherPass {
         .collect()
     }
 
-    fn draw(
-        site: &'static Site,
-        number: u32,
-        middle: Et,
-        errors: &SceneErrors,
-        seed: u64,
-    ) -> Self {
+    fn draw(site: &'static Site, number: u32, middle: Et, errors: &SceneErrors, seed: u64) -> Self {
         let mut random = Random::new(seed, &format!("pass {number}"));
         let half_deg = Site::WINDOW_HALF_LONGITUDE_DEG;
         let longitude_deg = site.longitude_deg + random.between(-half_deg, half_deg);
@@ -118,6 +113,11 @@ impl FurtherPass {
     /// From its first to its last frame.
     pub(super) fn frames(&self) -> Interval {
         Interval::new(self.middle, self.middle).padded(HALF_S)
+    }
+
+    /// The versions of its orbit.
+    pub(super) fn versions(&self, seed: u64) -> [Version; 3] {
+        FAMILIES.map(|family| Version::new(family, &self.file(), seed, self.middle))
     }
 
     /// Its orbit.

@@ -223,12 +223,11 @@ impl<'a> Flightpath<'a> {
 
     /// A further pass.
     pub(super) fn of_pass(pass: &'a FurtherPass, seed: u64) -> Self {
-        let name = pass.file();
         Self {
+            name: pass.file(),
             orbit: pass.orbit(),
             span: pass.frames().padded(KERNEL_MARGIN_S),
-            versions: FAMILIES.map(|family| Version::new(family, &name, seed, pass.middle)),
-            name,
+            versions: pass.versions(seed),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The synthetic mission, from plan to folder.
 
-use std::path::Path;
+use std::{collections::BTreeMap, path::Path};
 
 use super::{
     SceneOptions, SceneSummary,
@@ -12,9 +12,11 @@ use super::{
     further_passes::FurtherPass,
     images::{Coder, write_images},
     kernels::{
-        Flightpath, clock_session, image_start, versions, write_attitude, write_orbits, write_text_kernels,
+        Flightpath, clock_session, image_start, versions, write_attitude, write_orbits,
+        write_text_kernels,
     },
     laser::{LaserErrors, Shot},
+    orbit::Orbit,
     pedr::{PedrRequest, frame_tags, write_pedr},
     plan::{IMAGES, LOST_IMAGE, SITES, Site},
     sites::{README, planned_label, planned_site},
@@ -24,6 +26,7 @@ use super::{
         ContextTruth, DrawnTruth, FileTruth, ImageTruth, KeptShot, OrbitDifference, ProfileTruth,
         Truth,
     },
+    versions::Version,
 };
 use areograph_base::{
     body::{Datum, MARS_IAU2000},
@@ -253,7 +256,9 @@ fn write_kernels(draft: &Draft, options: &SceneOptions) -> Result<(Vec<Arc>, Vec
     }
     write_attitude(&kernels, &session, &arcs)?;
     drop(session);
-    let last = arcs.last().map_or_else(|| Et::from_seconds(0.0), |arc| arc.frames.stop);
+    let last = arcs
+        .last()
+        .map_or_else(|| Et::from_seconds(0.0), |arc| arc.frames.stop);
     let passes = FurtherPass::over(&SITES, options.passes, last, &options.errors, options.seed);
     let of_arcs = arcs.iter().map(|arc| Flightpath::of_arc(arc, options.seed));
     let of_passes = passes
@@ -288,6 +293,8 @@ fn write_pass(
         pass.site.contains(ground.longitude_rad, ground.latitude.0)
     })?;
     let mut profile = ProfileTruth::new(pass.site.id, &name, &kept);
+    profile.orbit_differences =
+        orbit_differences(&pass.versions(options.seed), pass.orbit(), &kept);
     profile.profile_shift = Some(pass.shift.clone());
     Ok((file, profile))
 }
@@ -340,24 +347,34 @@ fn write_day(
     context.retain(|kept| in_context(&kept.truth));
     let mut profile = ProfileTruth::new(image.site.id, &name, &kept);
     profile.image = Some(image.id);
-    for version in versions(arc, options.seed) {
+    profile.orbit_differences = orbit_differences(&versions(arc, options.seed), &arc.orbit, &kept);
+    Ok(Day {
+        file,
+        profile,
+        kept: context,
+    })
+}
+
+/// Differences of the versions of an orbit from the truth over the shots of a profile.
+fn orbit_differences(
+    versions: &[Version; 3],
+    orbit: &Orbit,
+    kept: &[KeptShot],
+) -> BTreeMap<&'static str, OrbitDifference> {
+    let difference = |version: &Version| {
         let mean_m = mean(kept.iter().map(|kept| {
             let KeptShot { truth, .. } = kept;
             let rival_m =
-                body_matrix(&MARS_IAU2000, truth.et) * version.position_m(&arc.orbit, truth.et);
+                body_matrix(&MARS_IAU2000, truth.et) * version.position_m(orbit, truth.et);
             truth.range_m - (rival_m - truth.told_ground_m).norm()
         }));
         let difference = OrbitDifference {
             radial_along_cross_m: version.offset_m.into(),
             expected_range_minus_distance_mean_m: mean_m,
         };
-        profile.orbit_differences.insert(version.family, difference);
-    }
-    Ok(Day {
-        file,
-        profile,
-        kept: context,
-    })
+        (version.family, difference)
+    };
+    versions.iter().map(difference).collect()
 }
 
 /// Mean of some values, 0 of none.

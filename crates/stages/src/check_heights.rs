@@ -177,7 +177,7 @@ stage_inputs! {
 
 impl Stage for CheckHeights<'_> {
     const NAME: &'static str = "check_heights";
-    const METHOD: u32 = 6;
+    const METHOD: u32 = 7;
     type Output = HeightCheck;
     stage_inputs!(fingerprint);
 

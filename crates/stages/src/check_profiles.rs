@@ -77,7 +77,7 @@ pub struct ShiftedProfile {
     pub covariance_m2: [[f64; 3]; 3],
 }
 
-/// A profile that is rejected because it contradicts the profiles that it crosses.
+/// A profile that is rejected because it contradicts the profiles that it crosses: it lies above or below them, or is misplaced.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LeftOutProfile {
     /// Identifier.
@@ -90,24 +90,46 @@ pub struct LeftOutProfile {
     pub above_m: f64,
     /// Standard deviation of this height, metres.
     pub sigma_m: f64,
+    /// Robust root mean square of the height differences at its crossovers, each divided by its standard deviation, which includes
+    /// shifts of both profiles; 1 is expected.
+    pub misfit: f64,
+    /// Whether the profile is misplaced horizontally; false where its mean height differs by more than five standard deviations.
+    pub misplaced: bool,
 }
 
 impl ProfileCheck {
     /// The remark on profiles that are left out, one sentence.
     #[must_use]
     pub fn remark(&self) -> Option<String> {
-        let named = self.left_out.iter().map(|profile| {
-            let (above_m, others) = (signed(profile.above_m, 1), profile.others.len());
-            format!("{} ({above_m} m, {others} profiles)", profile.profile)
+        let named = |misplaced: bool| {
+            let profiles = self.left_out.iter();
+            let named = profiles
+                .filter(|profile| profile.misplaced == misplaced)
+                .map(|profile| {
+                    let others = profile.others.len();
+                    let evidence = if misplaced {
+                        format!("misfit {:.1}", profile.misfit)
+                    } else {
+                        format!("{} m", signed(profile.above_m, 1))
+                    };
+                    format!("{} ({evidence}, {others} profiles)", profile.profile)
+                });
+            named.collect::<Vec<_>>().join(", ")
+        };
+        let reasons = [
+            (
+                false,
+                "profiles above or below all profiles that they cross",
+            ),
+            (true, "misplaced profiles"),
+        ];
+        let sentences = reasons.map(|(misplaced, reason)| {
+            let named = named(misplaced);
+            (!named.is_empty())
+                .then(|| format!("{reason}, rejected for the surface between shots: {named}"))
         });
-        let named: Vec<String> = named.collect();
-        (!named.is_empty()).then(|| {
-            format!(
-                "profiles that lie above or below all profiles that they cross and are rejected for the surface \
-                 between shots: {}",
-                named.join(", ")
-            )
-        })
+        let sentences: Vec<String> = sentences.into_iter().flatten().collect();
+        (!sentences.is_empty()).then(|| sentences.join("; "))
     }
 }
 
@@ -140,7 +162,7 @@ stage_inputs! {
 
 impl Stage for CheckProfiles<'_> {
     const NAME: &'static str = "check_profiles";
-    const METHOD: u32 = 4;
+    const METHOD: u32 = 5;
     type Output = ProfileCheck;
     stage_inputs!(fingerprint);
 
@@ -212,6 +234,8 @@ fn described(
         others: of.others.iter().map(|other| id(*other)).collect(),
         above_m: of.above_m,
         sigma_m: of.sigma_m,
+        misfit: of.misfit,
+        misplaced: !of.is_above(),
     });
     ProfileCheck {
         differences_m: Summary::of(&differences_m),

@@ -43,6 +43,8 @@ pub(super) struct Site {
     pub(super) verdict: Value,
     /// Whether a profile of the site lies elsewhere, which no default value describes.
     pub(super) has_misplaced_profile: bool,
+    /// Further passes that lie elsewhere, and how many of them are rejected; further passes of the others, likewise.
+    pub(super) further: [[usize; 2]; 2],
     /// What the adjustment states; nothing where there is none.
     pub(super) stated: Option<Stated>,
 }
@@ -184,6 +186,31 @@ fn clocks(truth: &Value, folder: &Path) -> [Vec<Pair>; 2] {
     found
 }
 
+/// Further passes over a site that lie elsewhere and others: their number, and how many the profile check rejects.
+fn further(truth: &Value, folder: &Path, site: &str) -> [[usize; 2]; 2] {
+    let checked = json(&folder.join("profiles.json"));
+    let rejected: Vec<&str> = checked["left_out"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|of| of["profile"].as_str().unwrap())
+        .collect();
+    let mut counts = [[0; 2]; 2];
+    for profile in truth["profiles"].as_array().unwrap() {
+        let shift = &profile["profile_shift"];
+        if profile["window"] != site || shift.is_null() || profile["et_s"][0].is_null() {
+            continue;
+        }
+        // `ap20001l.b` holds orbit 10001.
+        let number: u32 = profile["file"].as_str().unwrap()[2..7].parse().unwrap();
+        let name = format!("{site}/{}", number - 10_000);
+        let [all, found] = &mut counts[usize::from(shift["is_misplaced"] != true)];
+        *all += 1;
+        *found += usize::from(rejected.contains(&name.as_str()));
+    }
+    counts
+}
+
 /// Sizes of the errors of a mission.
 #[derive(Clone, Copy)]
 pub(super) enum Sizes {
@@ -201,6 +228,8 @@ pub(super) struct Plan<'a> {
     /// Noise of tie points as the site files state it, pixels.
     pub(super) noise_px: f64,
     pub(super) sizes: Sizes,
+    /// Further laser passes over each site.
+    pub(super) passes: u32,
     /// Further keys of the adjustment.
     pub(super) keys: &'a str,
     /// Changes the errors.
@@ -217,6 +246,7 @@ impl Plan<'_> {
             ground,
             noise_px,
             sizes: Sizes::Drawn,
+            passes: 0,
             keys: "",
             errors: |_| {},
             files: |_, _| {},
@@ -238,7 +268,7 @@ impl Plan<'_> {
         let options = SceneOptions {
             seed: self.seed.into(),
             day_s: 600.0,
-            passes: 0,
+            passes: self.passes,
             errors,
         };
         {
@@ -311,6 +341,7 @@ impl Plan<'_> {
             name: format!("{} {site}", self.seed),
             verdict,
             has_misplaced_profile,
+            further: further(truth, &folder, site),
             stated,
         }
     }

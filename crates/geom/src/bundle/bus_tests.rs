@@ -185,14 +185,14 @@ fn derivatives_by_the_shift_of_a_profile_equal_central_differences() {
 
 #[test]
 fn spots_by_parts_equal_the_dense_equations() {
-    for relief_sigma_m in [None, Some(70.0)] {
+    for uses_relief in [false, true] {
         let mut network = with_spots();
         network.attitude_clock = Some(AttitudeClock {
             sigma_s: 1.0,
             turns_rad_s: vec![Vector3::new(1e-5, -8.7e-4, 2e-5); 3],
         });
         let options = SurfaceOptions {
-            relief_sigma_m,
+            uses_relief,
             ..SurfaceOptions::default()
         };
         let surface = surface_with(&network, 35.0, &options);
@@ -205,7 +205,7 @@ fn spots_by_parts_equal_the_dense_equations() {
 #[test]
 fn a_profile_on_relief_lies_in_one_place() {
     let options = SurfaceOptions {
-        relief_sigma_m: Some(70.0),
+        uses_relief: true,
         ..SurfaceOptions::default()
     };
     let solved = |with_bus: bool| {
@@ -213,6 +213,7 @@ fn a_profile_on_relief_lies_in_one_place() {
         let surface = surface_with(&network, 0.0, &options);
         network.heights = Some(HeightControl {
             surface,
+            jitter: None,
             compared: Vec::new(),
             observed: CONTROLLED.collect(),
         });

@@ -48,6 +48,16 @@ fn surface(network: &Network<EulerPolynomial>, above_m: f64) -> LaserSurface {
     surface_with(network, above_m, &SurfaceOptions::default())
 }
 
+/// All controlled points observed above a surface.
+fn observed(surface: LaserSurface) -> HeightControl {
+    HeightControl {
+        surface,
+        jitter: None,
+        compared: Vec::new(),
+        observed: CONTROLLED.collect(),
+    }
+}
+
 pub(super) fn surface_with(
     network: &Network<EulerPolynomial>,
     above_m: f64,
@@ -200,7 +210,7 @@ fn relief_and_the_attitudes_clock_by_parts_equal_the_dense_equations() {
     let mut network = network();
     network.attitude_clock = Some(attitude_clock());
     let options = SurfaceOptions {
-        relief_sigma_m: Some(70.0),
+        uses_relief: true,
         ..SurfaceOptions::default()
     };
     let surface = surface_with(&network, 35.0, &options);
@@ -243,11 +253,7 @@ pub(super) fn are_those_of_the_dense_equations(
     mut network: Network<EulerPolynomial>,
     surface: &LaserSurface,
 ) {
-    network.heights = Some(HeightControl {
-        surface: surface.clone(),
-        compared: Vec::new(),
-        observed: CONTROLLED.collect(),
-    });
+    network.heights = Some(observed(surface.clone()));
     let (mut layout, start, active) = layout(&network);
     let shared = layout.columns.len();
     let bus = network.common_bus.as_ref();
@@ -358,11 +364,7 @@ fn ground_that_stands_higher_lifts_the_points_and_moves_them_little_in_plan() {
     let mean_height_m = |above_m: f64| {
         let mut network = measured(network());
         let surface = surface(&network, above_m);
-        network.heights = Some(HeightControl {
-            surface,
-            compared: Vec::new(),
-            observed: CONTROLLED.collect(),
-        });
+        network.heights = Some(observed(surface));
         let adjusted = solve(&network, &BundleOptions::default()).unwrap();
         let heights = CONTROLLED.map(|point| {
             height_m(
@@ -382,11 +384,7 @@ fn ground_that_stands_higher_lifts_the_points_and_moves_them_little_in_plan() {
 fn heights_that_do_not_converge_are_reported() {
     let mut network = network();
     let surface = surface(&network, 35.0);
-    network.heights = Some(HeightControl {
-        surface,
-        compared: Vec::new(),
-        observed: CONTROLLED.collect(),
-    });
+    network.heights = Some(observed(surface));
     let settled = |height_rounds_max| {
         let options = BundleOptions {
             height_rounds_max,
@@ -404,6 +402,7 @@ fn heights_that_are_only_compared_change_nothing() {
     let surface = surface(&network, 60.0);
     network.heights = Some(HeightControl {
         surface,
+        jitter: None,
         compared: CONTROLLED.collect(),
         observed: Vec::new(),
     });
@@ -426,11 +425,7 @@ fn a_height_that_no_surface_explains_loses_its_weight() {
     let hole_m = network.points[6].ground_m.normalize() * 900.0;
     network.points[6].ground_m -= hole_m;
     let mut network = measured(network);
-    network.heights = Some(HeightControl {
-        surface,
-        compared: Vec::new(),
-        observed: CONTROLLED.collect(),
-    });
+    network.heights = Some(observed(surface));
     let adjusted = solve(&network, &BundleOptions::default()).unwrap();
     let in_hole = adjusted
         .heights

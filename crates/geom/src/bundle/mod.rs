@@ -94,11 +94,13 @@
 mod check;
 mod common_bus;
 mod compared_heights;
+mod control;
 mod error;
 mod estimates;
 mod factor;
 mod groups;
 mod heights;
+mod jitter;
 mod known;
 mod layout;
 mod part;
@@ -119,6 +121,8 @@ mod bus_tests;
 #[cfg(test)]
 mod height_tests;
 #[cfg(test)]
+mod jitter_tests;
+#[cfg(test)]
 mod prior_tests;
 #[cfg(test)]
 mod tests;
@@ -126,6 +130,7 @@ mod tests;
 use nalgebra::{DMatrix, Matrix3, Vector2, Vector3};
 
 pub use common_bus::{AdjustedBus, CommonBus, Estimate, RecordedProfile, SharedRotation, Spot};
+pub use control::{HeightControl, Jitter};
 pub use error::BundleError;
 pub use known::KnownCoordinates;
 pub use part::Part;
@@ -136,7 +141,6 @@ pub use unknowns::Unknown;
 use super::{
     pushbroom::{Distortion, OrientationCorrection},
     robust::RobustWeight,
-    surface::LaserSurface,
 };
 
 /// Orientation unknowns of an image: X, Y, Z and the rotations about the camera's x, y and z axis, each with
@@ -216,17 +220,6 @@ pub struct AttitudeClock {
     pub sigma_s: f64,
     /// Inertial rotation rate of each image, camera components, radians per second.
     pub turns_rad_s: Vec<Vector3<f64>>,
-}
-
-/// Points whose height is compared with a surface.
-#[derive(Debug, Clone)]
-pub struct HeightControl {
-    /// The ground.
-    pub surface: LaserSurface,
-    /// Indices of the points whose height is compared with it.
-    pub compared: Vec<usize>,
-    /// Indices of the points whose height is an observation; the covariance of the heights is full.
-    pub observed: Vec<usize>,
 }
 
 /// The input of an adjustment.

@@ -124,7 +124,7 @@ pub(super) fn reduce<M: ExteriorOrientation>(
         sum.cost += weight * off * off;
     }
     if let Some(heights) = &layout.heights {
-        let heights = ReducedHeights::of(layout, heights, at)?;
+        let heights = ReducedHeights::of(layout, heights, at, heights.surface.relief.is_some())?;
         sum.right += heights.right();
         sum.cost += heights.weighted_squares();
         sum.heights = Some(heights);

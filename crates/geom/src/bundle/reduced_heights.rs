@@ -3,7 +3,7 @@
 //! Points are still eliminated one by one. With the triangle `R` that remains of their own rows, the change of a height
 //! by the point is `u = R⁻ᵀ ∂h/∂P`; the variance that the rays leave in it is `u·u`, and the shared unknowns see it
 //! through `G = −uᵀC`, `C` their part of the transformed rows. The heights are then observations of the shared unknowns
-//! with the covariance `Σ` = surface covariance + diag(u·u), and afterwards observations of the points.
+//! with the covariance `Σ` = surface covariance + jitter + diag(u·u), and afterwards observations of the points.
 //!
 //! # Source
 //! The partitioned inverse (Woodbury 1950) of normal equations with additional observations of the points.
@@ -13,6 +13,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
 use super::{
     HeightResidual,
     heights::Heights,
+    jitter,
     layout::{Layout, Linearised},
     point_rows::PointRows,
 };
@@ -31,18 +32,21 @@ pub(super) struct ReducedHeights {
     /// `u` of each point, and the motion of the point with its height.
     pub(super) turned: Vec<Vector3<f64>>,
     moves: Vec<Vector3<f64>>,
-    /// Covariance of surface and rays together, `Σ`, m².
+    /// Covariance of surface, jitter and rays together, `Σ`, m².
     pub(super) covariance_m2: DMatrix<f64>,
     factor: Cholesky<f64, Dyn>,
-    /// Covariance of the surface only.
+    /// Covariance of the observed heights: surface, robust weights and jitter, m², and its factor.
+    observed_m2: DMatrix<f64>,
     of_surface: Cholesky<f64, Dyn>,
 }
 
 impl ReducedHeights {
+    /// Reduces the heights; jitter counts where they determine planimetry.
     pub(super) fn of<M: ExteriorOrientation>(
         layout: &Layout<'_, M>,
         heights: &Heights,
         at: &Linearised,
+        with_jitter: bool,
     ) -> Result<Self, Unseen> {
         let (count, columns) = (heights.points.len(), layout.columns.len());
         let mut misclosures_m = DVector::zeros(count);
@@ -75,13 +79,18 @@ impl ReducedHeights {
             turned.push(u);
             moves.push(step);
         }
-        let covariance_m2 = heights.covariance_m2();
+        let mut covariance_m2 = heights.covariance_m2();
+        let control = layout.network.heights.as_ref();
+        let jitter = control.and_then(|control| control.jitter.as_ref());
+        if let Some(jitter) = jitter.filter(|_| with_jitter) {
+            covariance_m2 += jitter::covariance_m2(layout, jitter, &heights.points, &by_shared);
+        }
         let ray_variances_m2 =
             DVector::from_iterator(count, turned.iter().map(Vector3::norm_squared));
         let with_rays_m2 = &covariance_m2 + DMatrix::from_diagonal(&ray_variances_m2);
         // An invalid covariance comes from points without a finite position.
         let factor = Cholesky::new(with_rays_m2.clone()).ok_or(Unseen::BehindCamera)?;
-        let of_surface = Cholesky::new(covariance_m2).ok_or(Unseen::BehindCamera)?;
+        let of_surface = Cholesky::new(covariance_m2.clone()).ok_or(Unseen::BehindCamera)?;
         Ok(Self {
             misclosures_m,
             by_shared,
@@ -91,6 +100,7 @@ impl ReducedHeights {
             moves,
             covariance_m2: with_rays_m2,
             factor,
+            observed_m2: covariance_m2,
             of_surface,
         })
     }
@@ -123,10 +133,10 @@ impl ReducedHeights {
 
     /// Residuals of the heights, `left` being `Σ⁻¹ − Σ⁻¹ G Q Gᵀ Σ⁻¹`, `Q` the cofactors of the shared unknowns.
     ///
-    /// Redundancy numbers are the diagonal of the covariance of the surface times `left`. With correlated observations
+    /// Redundancy numbers are the diagonal of the covariance of the observed heights times `left`. With correlated observations
     /// a single number may lie outside `0..=1`; only their sum is meaningful.
     pub(super) fn residuals(&self, heights: &Heights, left: &DMatrix<f64>) -> Vec<HeightResidual> {
-        let redundancies = (heights.covariance_m2() * left).diagonal();
+        let redundancies = (&self.observed_m2 * left).diagonal();
         (0..heights.points.len())
             .map(|index| {
                 let variance_m2 = heights.surface.covariance_m2[(index, index)];

@@ -70,7 +70,7 @@ fn sigma_m<M: ExteriorOrientation>(
     settled: &Settled,
     heights: &Heights,
 ) -> Option<[f64; 2]> {
-    let plain = ReducedHeights::of(layout, &heights.without_plan(), &settled.at).ok()?;
+    let plain = ReducedHeights::of(layout, &heights.without_plan(), &settled.at, true).ok()?;
     let factor = Factor::new(&settled.reduced.matrix, Some(&plain)).ok()?;
     let (_, weights) = factor.through_heights()?;
     let slopes = &heights.surface.slopes;

@@ -49,12 +49,7 @@ impl BlockedCholesky {
                 let from = rest + first;
                 DMatrixViewMut::from_slice(columns, rows, width)
                     .rows_mut(from, rows - from)
-                    .gemm(
-                        -1.0,
-                        &below.rows(first, rows - from),
-                        &of_columns,
-                        1.0,
-                    );
+                    .gemm(-1.0, &below.rows(first, rows - from), &of_columns, 1.0);
             });
         }
         Some(Self {
@@ -77,11 +72,7 @@ impl BlockedCholesky {
     pub(super) fn solve(&self, b: &DVector<f64>) -> DVector<f64> {
         let mut solution = b.clone();
         let rows = solution.len();
-        self.solve_columns(DMatrixViewMut::from_slice(
-            solution.as_mut_slice(),
-            rows,
-            1,
-        ));
+        self.solve_columns(DMatrixViewMut::from_slice(solution.as_mut_slice(), rows, 1));
         solution
     }
 
@@ -119,7 +110,8 @@ mod tests {
                 ((row * 31 + column * 17) % 23) as f64 - 11.0
             });
             let matrix = &root * root.transpose() + DMatrix::identity(rows, rows) * 50.0;
-            let right = DMatrix::from_fn(rows, columns, |row, column| (1 + row + 3 * column) as f64);
+            let right =
+                DMatrix::from_fn(rows, columns, |row, column| (1 + row + 3 * column) as f64);
             let factor = BlockedCholesky::new(matrix.clone()).unwrap();
             let mut solution = right.clone();
             factor.solve_mut(&mut solution);

@@ -31,6 +31,8 @@ pub struct Crossover {
     pub sigma_m: f64,
     /// Slope of the ground towards east and north, metres per metre; zero for profiles that are almost parallel.
     pub slope: Vector2<f64>,
+    /// Root mean square slope along the two profiles, metres per metre: more certain than the slope across them.
+    pub slope_along: f64,
 }
 
 /// A segment between two successive shots of a profile.
@@ -179,6 +181,7 @@ fn crossover(
         difference_m: sign * (heights_m[0] - heights_m[1]),
         sigma_m: variance_m2.sqrt(),
         slope,
+        slope_along: (0.5 * segments.map(|of| of.slope.powi(2)).iter().sum::<f64>()).sqrt(),
     }
 }
 

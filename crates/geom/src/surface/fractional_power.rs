@@ -13,7 +13,7 @@ const BIAS: i32 = 1_023;
 /// `x^p` of a fixed `p`, to a few units of the last place.
 ///
 /// With `x = 2^e · m · (1 + r)`, `m` the middle of one of 64 intervals of the significand, the first two factors are table
-/// entries and the last is the binomial series. A general power takes about five times as long.
+/// entries and the last is the binomial series.
 #[derive(Debug)]
 pub(super) struct FractionalPower {
     exponent: f64,

@@ -37,6 +37,7 @@ mod blocked_cholesky;
 mod crossovers;
 mod fractional_power;
 mod kriging;
+mod left_out;
 mod plan;
 mod profiles;
 mod shot;
@@ -56,7 +57,8 @@ use crate::ellipsoid::height_m;
 use areograph_base::body::{Body, BodyModel};
 
 pub use crossovers::{Crossover, crossovers};
-pub use profiles::{LeftOut, ProfileNet, ProfilePriors, ProfileShift};
+pub use left_out::{LeftOut, ProfilePriors};
+pub use profiles::{ProfileNet, ProfileShift};
 pub use shot::{
     NADIR_MAX_RAD, SharedErrors, SurfaceShot, attitude_sigma_m, turned_sigmas_m, with_across_track,
 };
@@ -84,9 +86,11 @@ pub struct SurfaceOptions {
     pub plan_sigma_m: f64,
     /// Minimum roughness, metres at 300 m, see [`Variogram`].
     pub roughness_min_m: f64,
-    /// Planimetric standard deviation of a profile on each axis where relief determines planimetry, metres. The
-    /// planimetric error between images and shots is then estimated from heights, and is not part of their own errors.
-    pub relief_sigma_m: Option<f64>,
+    /// Planimetric error that all shots of a profile share, on each axis, metres.
+    pub profile_plan_sigma_m: f64,
+    /// Whether relief determines planimetry: the planimetric error between images and shots is then estimated from heights, and is
+    /// not part of their own errors.
+    pub uses_relief: bool,
     /// The body whose ellipsoid heights refer to.
     pub body: Body,
 }
@@ -100,7 +104,8 @@ impl Default for SurfaceOptions {
             profile_sigma_m: 1.0,
             plan_sigma_m: 130.0,
             roughness_min_m: 2.0,
-            relief_sigma_m: None,
+            profile_plan_sigma_m: PROFILE_PLAN_M,
+            uses_relief: false,
             body: Body::Mars,
         }
     }
@@ -234,7 +239,7 @@ impl LaserSurface {
     /// Whether heights above it determine planimetry.
     #[must_use]
     pub const fn uses_relief(&self) -> bool {
-        self.options.relief_sigma_m.is_some()
+        self.options.uses_relief
     }
 
     /// Number of shots of the surface.
@@ -260,13 +265,13 @@ impl LaserSurface {
         let of_profiles = self.kriging.radial_of_profiles(&weights);
         covariance_m2 += of_profiles.tr_mul(&of_profiles) * self.options.profile_sigma_m.powi(2);
         let without_plan_m2 = covariance_m2.clone();
-        let relief = self.options.relief_sigma_m.map(|sigma_m| Relief {
+        let relief = self.options.uses_relief.then(|| Relief {
             by_place: places_m
                 .iter()
                 .zip(&slopes)
                 .map(|(place, slope)| self.plan.by_place(place, slope))
                 .collect(),
-            profiles: self.on_relief(&slopes, &weights, sigma_m),
+            profiles: self.on_relief(&slopes, &weights),
         });
         if let Some(relief) = &relief {
             for profile in &relief.profiles {
@@ -309,12 +314,7 @@ impl LaserSurface {
     }
 
     /// Each profile by its share in the heights, of `weights`.
-    fn on_relief(
-        &self,
-        slopes: &[Vector2<f64>],
-        weights: &Weights,
-        sigma_m: f64,
-    ) -> Vec<ProfileOnRelief> {
+    fn on_relief(&self, slopes: &[Vector2<f64>], weights: &Weights) -> Vec<ProfileOnRelief> {
         let of_profiles = self.kriging.sums_of_profiles(weights);
         let by_shift = |profile: usize| {
             Matrix3xX::from_fn(slopes.len(), |axis, place| {
@@ -327,7 +327,7 @@ impl LaserSurface {
             .map(|profile| {
                 let shared = self.kriging.shared_of(profile);
                 let (plan_m, radial_m) = (
-                    shared.plan * sigma_m,
+                    shared.plan * self.options.profile_plan_sigma_m,
                     shared.radial * self.options.profile_sigma_m,
                 );
                 ProfileOnRelief {

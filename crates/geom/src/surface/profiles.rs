@@ -4,46 +4,17 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Vector3};
 
-use super::{Crossover, SharedErrors};
-use crate::statistics::{NORMAL_MAD, median};
+use super::{
+    Crossover, SharedErrors,
+    left_out::{LeftOut, ProfilePriors, student_weight, worst},
+};
 
-/// Fewest crossovers, with as many other profiles, by which a profile is left out.
-const EVIDENCE_MIN: usize = 3;
-/// A profile that lies farther from all others than this many standard deviations is left out.
-const LEFT_OUT_SIGMAS: f64 = 5.0;
 /// Weight of the a priori standard deviation in the estimated one, in profiles.
 const PRIOR_PROFILES: f64 = 3.0;
 /// Steps of the estimate; it changes by less than 1 % after half of them.
 const STEPS: usize = 40;
 /// A shift counts in the estimate by at most this many standard deviations.
 const SHIFT_MAX_SIGMAS: f64 = 3.0;
-/// Degrees of freedom of Student's distribution for the weights of crossovers.
-const FREEDOM: f64 = 4.0;
-
-/// A priori standard deviations of the shift of a profile, metres.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ProfilePriors {
-    /// Along the radius.
-    pub radial_sigma_m: f64,
-    /// In plan, on each axis.
-    pub plan_sigma_m: f64,
-}
-
-/// A profile that does not belong to the others: at its crossovers it lies above or below all of them by one constant.
-#[derive(Debug, Clone, PartialEq)]
-pub struct LeftOut {
-    /// Its index.
-    pub profile: usize,
-    /// Profiles that it crosses, ascending; those that were left out before it are not among them.
-    pub others: Vec<usize>,
-    /// Crossovers with them.
-    pub crossovers: usize,
-    /// Height of the profile above the others, metres.
-    pub above_m: f64,
-    /// Standard deviation of this height, metres.
-    pub sigma_m: f64,
-}
-
 /// The shift of a profile.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ProfileShift {
@@ -121,74 +92,6 @@ impl ProfileNet {
         };
         net.profiles.iter().enumerate().map(shift).collect()
     }
-}
-
-/// The profile that belongs least, if it does not belong.
-fn worst(crossovers: &[Crossover], priors: &ProfilePriors) -> Option<LeftOut> {
-    let mut by_profile: BTreeMap<usize, Vec<(usize, f64, f64)>> = BTreeMap::new();
-    for crossover in crossovers {
-        let [first, second] = crossover.profiles;
-        let [own, others] = crossover.shared;
-        for (profile, other, sign, of_other) in
-            [(first, second, 1.0, others), (second, first, -1.0, own)]
-        {
-            // The other profile has a shift as well.
-            let shift_m = priors.radial_sigma_m * of_other.radial;
-            let variance_m2 = crossover.sigma_m.powi(2) + shift_m.powi(2);
-            let of_profile = by_profile.entry(profile).or_default();
-            of_profile.push((other, sign * crossover.difference_m, variance_m2));
-        }
-    }
-    let all = by_profile.iter().filter_map(|(profile, crossovers)| {
-        let others: BTreeSet<usize> = crossovers.iter().map(|(other, ..)| *other).collect();
-        let (above_m, sigma_m) = robust_mean(crossovers);
-        // Unknown attitude explains a shift, but does not make its profile useful.
-        let sigma_m = sigma_m.hypot(priors.radial_sigma_m);
-        (others.len() >= EVIDENCE_MIN).then(|| LeftOut {
-            profile: *profile,
-            others: others.into_iter().collect(),
-            crossovers: crossovers.len(),
-            above_m,
-            sigma_m,
-        })
-    });
-    let sigmas = |of: &LeftOut| of.above_m.abs() / of.sigma_m;
-    // Of equal ones the first.
-    let worst = all.reduce(|worst, of| {
-        if sigmas(&of) > sigmas(&worst) {
-            of
-        } else {
-            worst
-        }
-    })?;
-    (sigmas(&worst) > LEFT_OUT_SIGMAS).then_some(worst)
-}
-
-/// Mean of differences by Student's distribution, with its standard deviation: as large as their scatter, if that
-/// exceeds their variances.
-fn robust_mean(differences: &[(usize, f64, f64)]) -> (f64, f64) {
-    let mut values_m: Vec<f64> = differences.iter().map(|(_, value_m, _)| *value_m).collect();
-    let mut mean_m = median(&mut values_m);
-    let mut weights = 0.0;
-    for _ in 0..10 {
-        let mut sum = 0.0;
-        weights = 0.0;
-        for (_, value_m, variance_m2) in differences {
-            let weight = student_weight((value_m - mean_m).powi(2) / variance_m2) / variance_m2;
-            weights += weight;
-            sum += weight * value_m;
-        }
-        mean_m = sum / weights;
-    }
-    let deviations = differences
-        .iter()
-        .map(|(_, value_m, variance_m2)| (value_m - mean_m).abs() / variance_m2.sqrt());
-    let scatter = NORMAL_MAD * median(&mut deviations.collect::<Vec<_>>());
-    (mean_m, scatter.max(1.0) / f64::sqrt(weights))
-}
-
-fn student_weight(square: f64) -> f64 {
-    ((FREEDOM + 1.0) / (FREEDOM + square)).min(1.0)
 }
 
 fn radial_sigma_m(crossovers: &[Crossover], prior_m: f64) -> f64 {
@@ -435,6 +338,48 @@ mod tests {
             let error_m = shift.shift_m.z - shifts_m[shift.profile];
             // Three crossovers or more of 1.2 m, with as many unknown partners.
             assert!(error_m.abs() < 3.0 * sigma_m && sigma_m < 1.0, "{shift:?}");
+        }
+    }
+
+    /// Heights of waves in two directions, metres.
+    fn waves_m(east_m: f64, north_m: f64) -> f64 {
+        let along = |length_m: f64, x_m: f64| (std::f64::consts::TAU * x_m / length_m).sin();
+        30.0 * along(7_000.0, north_m) + 25.0 * along(5_000.0, east_m + 0.4 * north_m)
+    }
+
+    /// Crossing profiles over waves, one of them recorded this far to the east.
+    fn over_waves(number: usize, of: usize, aside_m: f64) -> Vec<SurfaceShot> {
+        let radius_m = MARS_IAU2000.equatorial_radius_m;
+        let mut shots = crossing(&vec![0.0; number], 800.0);
+        for shot in &mut shots {
+            let place = crate::ellipsoid::Spherical::from_xyz_m(&shot.ground_m);
+            let recorded_m = [place.longitude_rad, place.latitude.0].map(|angle| angle * radius_m);
+            let true_east_m = if shot.profile == of {
+                recorded_m[0] - aside_m
+            } else {
+                recorded_m[0]
+            };
+            let up = shot.ground_m.normalize();
+            let height_m = waves_m(true_east_m, recorded_m[1]);
+            shot.ground_m = on_ellipsoid_m(Body::Mars.model(), &up) + height_m * up;
+        }
+        shots
+    }
+
+    #[test]
+    fn a_profile_that_is_recorded_elsewhere_is_left_out_and_only_that() {
+        for (aside_m, expected) in [(1_200.0, Some(3)), (70.0, None)] {
+            let found = crossovers(&over_waves(10, 3, aside_m), &SurfaceOptions::default());
+            let net = ProfileNet::of(&found, &PRIORS);
+            let left_out: Vec<usize> = net.left_out.iter().map(|of| of.profile).collect();
+            assert_eq!(
+                left_out,
+                expected.into_iter().collect::<Vec<_>>(),
+                "{aside_m}"
+            );
+            if let [only] = net.left_out.as_slice() {
+                assert!(!only.is_above() && only.misfit > 4.0, "{only:?}");
+            }
         }
     }
 

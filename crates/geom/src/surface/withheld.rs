@@ -96,7 +96,7 @@ pub fn withheld(shots: &[SurfaceShot], options: &SurfaceOptions) -> Vec<Withheld
     // Shots of one instrument share the errors of its position in plan.
     let options = SurfaceOptions {
         plan_sigma_m: 0.0,
-        relief_sigma_m: None,
+        uses_relief: false,
         ..*options
     };
     let mut stretches = Vec::new();

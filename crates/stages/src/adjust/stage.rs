@@ -50,7 +50,7 @@ stage_inputs! {
 
 impl Stage for Adjust<'_> {
     const NAME: &'static str = "adjust";
-    const METHOD: u32 = 16;
+    const METHOD: u32 = 17;
     type Output = Adjusted;
     stage_inputs!(fingerprint);
 
@@ -77,15 +77,13 @@ impl Stage for Adjust<'_> {
         });
         let (footprints, profiles) = (&self.converted.value()?.footprints, self.profiles.value()?);
         let (ties, starts) = (&self.ties.value()?.points, self.intersected.value()?);
-        let relief_for_plan = self.adjustment.relief_for_plan;
         let surface = match self.adjustment.model {
             // Without enough shots, heights follow from the orientations.
             AdjustmentModel::MolaSurface => {
                 let around = starts.points.iter().map(|point| point.ground.xyz_m);
                 let around: Vec<_> = around.collect();
                 let options = SurfaceOptions {
-                    relief_sigma_m: relief_for_plan
-                        .then_some(self.laser_surface.profile_plan_sigma_m),
+                    uses_relief: self.adjustment.relief_for_plan,
                     ..self.laser_surface.options(footprints.body)
                 };
                 let shots = MolaShots::of(footprints, profiles, &options);

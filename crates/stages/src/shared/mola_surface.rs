@@ -80,7 +80,7 @@ impl MolaShots {
         let crossovers = crossovers(&shots, options);
         let priors = ProfilePriors {
             radial_sigma_m: options.profile_sigma_m,
-            plan_sigma_m: 0.0,
+            plan_sigma_m: options.profile_plan_sigma_m,
         };
         let net = ProfileNet::of(&crossovers, &priors);
         let left_out: BTreeSet<usize> = net.left_out.iter().map(|of| of.profile).collect();
