@@ -360,7 +360,8 @@ fn footprints_come_back_within_0_2_m_and_times_within_2_us() {
         let records = records(&MISSION.path(&format!("pedr/{file}")));
         let times = numbers(&profile["et_s"]);
         let grounds = vectors(&profile["ground_iau2000_m"]);
-        assert!(times.len() > 150, "{file}: {} shots", times.len());
+        // A further pass may leave the window through its side.
+        assert!(times.len() > 100, "{file}: {} shots", times.len());
         for (((record, shot), time_s), truth_m) in
             shots(profile).into_iter().zip(times).zip(grounds)
         {
@@ -448,7 +449,8 @@ fn site_files_pass_their_own_checks() {
 
 #[test]
 fn images_are_taken_by_day_and_the_records_say_so() {
-    for profile in MISSION.truth["profiles"].as_array().unwrap() {
+    let profiles = MISSION.truth["profiles"].as_array().unwrap().iter();
+    for profile in profiles.filter(|profile| !profile["image"].is_null()) {
         let file = profile["file"].as_str().unwrap();
         let records = records(&MISSION.path(&format!("pedr/{file}")));
         let record = &records[shots(profile)[0].0];
@@ -481,7 +483,8 @@ fn the_same_seed_gives_the_same_bytes() {
             }
         }
     }
-    assert_eq!(compared, 7 + 6 + 5 + 7 + 9 + 4 + 4 + 3);
+    // The second 6: two further passes over each site.
+    assert_eq!(compared, 7 + 6 + 5 + 7 + 6 + 9 + 4 + 4 + 3);
     assert_eq!(
         fs::read_dir(folder.path()).unwrap().count(),
         1,
