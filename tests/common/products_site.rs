@@ -176,7 +176,6 @@ impl Site {
             &self.footprints,
             &self.profiles,
             &surface.options(self.footprints.body),
-            surface.profile_plan_sigma_m,
         )
     }
 

@@ -107,8 +107,7 @@ declare_table! {
         )).or(false),
         /// Whether heights of tie points on slopes of the MOLA surface also determine the images in plan. This is
         /// useful where, according to the report, relief determines the position to less than half of the a priori
-        /// standard deviation. The roughness over 300 m then exceeds 25 m for measurement errors of one pixel, or 7 m
-        /// for 0.3 pixels.
+        /// standard deviation: on rough ground, with precise tie points, and with many profiles near them.
         relief_for_plan: bool = key(yes_or_no(
             "slopes only increase the uncertainty of heights",
             "each profile may be offset in plan, and tie points shift until their heights fit",

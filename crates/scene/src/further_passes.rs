@@ -5,6 +5,7 @@ use nalgebra::Vector3;
 use super::{
     arc::{Beam, Flight},
     error_sources::{PositionErrors, SceneErrors},
+    orbit::Orbit,
     passes::Pass,
     plan::Site,
     profile_shift::ProfileShift,
@@ -121,7 +122,7 @@ impl FurtherPass {
     }
 
     /// Its orbit.
-    pub(super) const fn orbit(&self) -> &super::orbit::Orbit {
+    pub(super) const fn orbit(&self) -> &Orbit {
         self.pass.orbit()
     }
 }

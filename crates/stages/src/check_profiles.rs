@@ -172,7 +172,6 @@ impl Stage for CheckProfiles<'_> {
             footprints,
             self.profiles.value()?,
             &self.laser_surface.options(footprints.body),
-            self.laser_surface.profile_plan_sigma_m,
         ))
     }
 }
@@ -183,7 +182,6 @@ pub fn check_profiles(
     footprints: &Footprints<BodyFixed>,
     profiles: &[Profile],
     options: &SurfaceOptions,
-    plan_sigma_m: f64,
 ) -> ProfileCheck {
     let (shots, crossed) = MolaShots::crossed(footprints, profiles, options);
     let stretches = withheld(&shots.shots, &shots.options(options));
@@ -198,7 +196,7 @@ pub fn check_profiles(
     ProfileCheck {
         score,
         stretches: stretches.into_iter().map(stretch).collect(),
-        ..described(&crossed, profiles, options, plan_sigma_m)
+        ..described(&crossed, profiles, options)
     }
 }
 
@@ -208,22 +206,20 @@ pub fn cross_profiles(
     footprints: &Footprints<BodyFixed>,
     profiles: &[Profile],
     options: &SurfaceOptions,
-    plan_sigma_m: f64,
 ) -> ProfileCheck {
     let (_, crossed) = MolaShots::crossed(footprints, profiles, options);
-    described(&crossed, profiles, options, plan_sigma_m)
+    described(&crossed, profiles, options)
 }
 
 fn described(
     CrossedProfiles { crossovers, net }: &CrossedProfiles,
     profiles: &[Profile],
     options: &SurfaceOptions,
-    plan_sigma_m: f64,
 ) -> ProfileCheck {
     let id = |profile: usize| profiles[profile].id.clone();
     let priors = ProfilePriors {
         radial_sigma_m: options.profile_sigma_m,
-        plan_sigma_m,
+        plan_sigma_m: options.profile_plan_sigma_m,
     };
     let belonging = net.belonging(crossovers);
     let differences_m: Vec<f64> = belonging.iter().map(|of| of.difference_m).collect();

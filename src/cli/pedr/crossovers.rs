@@ -123,12 +123,7 @@ impl Shots {
         }
         let priors = MolaSurfaceConfig::default();
         let options = priors.options(footprints.body);
-        let check = cross_profiles(
-            &footprints,
-            &profiles,
-            &options,
-            priors.profile_plan_sigma_m,
-        );
+        let check = cross_profiles(&footprints, &profiles, &options);
         Ok(json!({
             "complete": self.failures.is_empty() && self.complaints == 0,
             "failures": self.failures.iter().map(ToString::to_string).collect::<Vec<_>>(),

@@ -43,7 +43,7 @@ pub(super) struct Site {
     pub(super) verdict: Value,
     /// Whether a profile of the site lies elsewhere, which no default value describes.
     pub(super) has_misplaced_profile: bool,
-    /// Further passes that lie elsewhere, and how many of them are rejected; further passes of the others, likewise.
+    /// Number of misplaced further passes and of those that are rejected; the same of correctly placed ones.
     pub(super) further: [[usize; 2]; 2],
     /// What the adjustment states; nothing where there is none.
     pub(super) stated: Option<Stated>,
@@ -186,7 +186,7 @@ fn clocks(truth: &Value, folder: &Path) -> [Vec<Pair>; 2] {
     found
 }
 
-/// Further passes over a site that lie elsewhere and others: their number, and how many the profile check rejects.
+/// Misplaced further passes over a site, and correctly placed ones: their number, and how many the profile check rejects.
 fn further(truth: &Value, folder: &Path, site: &str) -> [[usize; 2]; 2] {
     let checked = json(&folder.join("profiles.json"));
     let rejected: Vec<&str> = checked["left_out"]

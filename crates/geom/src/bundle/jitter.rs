@@ -6,10 +6,9 @@
 
 use nalgebra::DMatrix;
 
-use super::{control::Jitter, layout::Layout};
+use super::{control::Jitter, layout::Layout, unknowns::CONSTANT_ROLL};
 
-/// Coefficient of the constant rotation about the camera's x axis, and the number of powers of time.
-const CONSTANT_ROLL: usize = 9;
+/// Powers of time of a parabola.
 const POWERS: usize = 3;
 
 /// Covariance of the heights of `points` by jitter, m²: for every image, `gᵢ gⱼ σ² exp(−|tᵢ − tⱼ|/τ)` without the least-squares

@@ -51,7 +51,7 @@ pub enum Unknown {
 }
 
 /// Coefficient of the constant rotation about the camera's x axis.
-const CONSTANT_ROLL: usize = 9;
+pub(super) const CONSTANT_ROLL: usize = 9;
 /// Names of the corrected quantities of an orientation.
 const QUANTITIES: [&str; 6] = [
     "X position",

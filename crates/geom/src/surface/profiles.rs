@@ -15,6 +15,7 @@ const PRIOR_PROFILES: f64 = 3.0;
 const STEPS: usize = 40;
 /// A shift counts in the estimate by at most this many standard deviations.
 const SHIFT_MAX_SIGMAS: f64 = 3.0;
+
 /// The shift of a profile.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ProfileShift {
@@ -367,7 +368,7 @@ mod tests {
     }
 
     #[test]
-    fn a_profile_that_is_recorded_elsewhere_is_left_out_and_only_that() {
+    fn a_misplaced_profile_is_left_out_and_only_that() {
         for (aside_m, expected) in [(1_200.0, Some(3)), (70.0, None)] {
             let found = crossovers(&over_waves(10, 3, aside_m), &SurfaceOptions::default());
             let net = ProfileNet::of(&found, &PRIORS);
