@@ -2,6 +2,7 @@
 
 mod calibrate;
 mod check;
+mod compare_readings;
 mod completions;
 mod export;
 mod fetch;
@@ -92,6 +93,7 @@ enum Command {
     #[command(after_help = "Example: areograph pedr info ap10001l.b")]
     Pedr(pedr::Arguments),
     Report(report::Arguments),
+    CompareReadings(compare_readings::Arguments),
     Export(export::Arguments),
     Triangulate(triangulate::Arguments),
     Calibrate(calibrate::Arguments),
@@ -164,6 +166,7 @@ fn run(command: Command) -> ExitCode {
         Command::Image(arguments) => finish(image::run(&arguments)),
         Command::Pedr(arguments) => pedr::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),
+        Command::CompareReadings(arguments) => finish(compare_readings::run(&arguments)),
         Command::Export(arguments) => finish(export::run(&arguments)),
         Command::Triangulate(arguments) => triangulate::run(&arguments),
         Command::Calibrate(arguments) => calibrate::run(&arguments),

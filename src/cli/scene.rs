@@ -79,6 +79,15 @@ struct MissionArguments {
     /// With --realistic: one offset of the attitude's clock for all images instead of line times of each.
     #[arg(long, requires = "realistic")]
     attitude_clock: bool,
+    /// With --attitude-clock: this offset instead of one that is drawn, -100 to 100.
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        requires = "attitude_clock",
+        allow_negative_numbers = true,
+        value_parser = clock_offset
+    )]
+    attitude_clock_s: Option<f64>,
     /// Further laser passes over each site of narrow-angle images, on days without an image, 0 to 1000.
     #[arg(long, value_name = "COUNT", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=1000))]
     passes: u32,
@@ -188,6 +197,14 @@ impl Code {
     }
 }
 
+/// An offset as typed.
+fn clock_offset(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(offset_s) if offset_s.abs() <= 100.0 => Ok(offset_s),
+        _ => Err("expected a number from -100 to 100".to_owned()),
+    }
+}
+
 impl MissionArguments {
     fn errors(&self) -> SceneErrors {
         if !self.realistic {
@@ -200,7 +217,7 @@ impl MissionArguments {
             Ground::Varied => Roughness::Varied,
         });
         let drawn = if self.attitude_clock {
-            realistic.with_attitude_clock()
+            realistic.with_attitude_clock(self.attitude_clock_s)
         } else {
             realistic
         };

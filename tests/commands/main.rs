@@ -5,6 +5,7 @@ mod bad_input;
 #[path = "../common/mod.rs"]
 mod common;
 mod compare_kernels;
+mod compare_readings;
 mod contradictions;
 mod contradictions_attitude;
 mod crossover_choice;

@@ -549,6 +549,18 @@ fn options_without_realistic_or_out_of_range_are_refused() {
     refused(&["--tie-noise-px", "0.22"], 2, "--realistic");
     refused(&["--attitude-clock"], 2, "--realistic");
     refused(
+        &["--realistic", "--attitude-clock-s", "0.5"],
+        2,
+        "--attitude-clock",
+    );
+    let offset = [
+        "--realistic",
+        "--attitude-clock",
+        "--attitude-clock-s",
+        "NaN",
+    ];
+    refused(&offset, 2, "-100 to 100");
+    refused(
         &["--realistic", "--roughness", "steep"],
         2,
         "plains, medium, rough",

@@ -22,6 +22,7 @@ mod misregistration;
 mod orbit;
 mod overlays;
 mod profiles;
+mod readings;
 mod relief;
 mod shared_errors;
 mod stated;

@@ -6,7 +6,7 @@ use areograph_base::{
     footprints::{AdjustmentModel, FootprintImageCoordinates},
     units::{RADIANS_PER_ARCSECOND, SECONDS_PER_MS},
 };
-use areograph_geom::{robust::RobustWeight, statistics::BAARDA_LIMIT};
+use areograph_geom::{readings::Cause, robust::RobustWeight, statistics::BAARDA_LIMIT};
 
 use super::{
     declare::{Declare as _, Keys, Many, declare_table, group, key, tables},
@@ -14,6 +14,7 @@ use super::{
         Number, Several, above_to, from_to, identifier, several, words, words_of, yes_or_no,
         zero_or,
     },
+    readings::{DecisionFile, ReadingsDecision},
     unknowns::{PositionUnknowns, RotationUnknowns},
 };
 
@@ -84,13 +85,16 @@ declare_table! {
             .map(|milliseconds| milliseconds * SECONDS_PER_MS),
         /// Whether the along-track disagreement between the images of a pair is attributed to one time offset of the
         /// attitudes of all images. This offset rotates nadir-following images, but not inertially held images.
-        /// Otherwise, all images are equally likely to be in error. Tie points cannot distinguish the two causes: this
-        /// key is a decision, not an estimate. Where the images of a pair disagree by more than 100 m, the report and
+        /// Otherwise, all images are equally likely to be in error. Tie points of one pair cannot distinguish the two
+        /// causes: this key is a decision, not an estimate; see `readings`. Where the images of a pair disagree by more than 100 m, the report and
         /// adjustment.json give both results.
         attitude_clock: bool = key(yes_or_no(
             "all images are equally likely to be in error",
             "nadir-following images are in error, by one offset",
         )).or(false),
+        /// File in which `areograph compare-readings --toml` printed its result over many pairs of images. It decides on
+        /// `attitude_clock`: "yes" if the pairs support one offset, otherwise "no".
+        readings: Option<ReadingsDecision> = key(DecisionFile).unused(r#""readings.toml""#),
         /// Standard deviation of the time offset of the attitudes (`attitude_clock`).
         attitude_clock_sigma_s: f64 = key(SIGMA).or(1.0),
         /// Upper limit of the standard deviations of constant image rotations with `attitude_clock`: 0.1 mrad. A clock
@@ -184,7 +188,17 @@ declare_table! {
         /// Images whose unknowns have their own standard deviations.
         images: Vec<OrientationPrior> = tables(Many::ANY),
     }
+    settle clock_by_readings
     check keys_of_the_model
+}
+
+/// The decision of many pairs replaces the decision of the user.
+fn clock_by_readings(mut adjustment: AdjustmentConfig, _keys: &Keys<'_, '_>) -> AdjustmentConfig {
+    let is_used = adjustment.model == AdjustmentModel::MolaSurface;
+    if let Some(readings) = adjustment.readings.as_ref().filter(|_| is_used) {
+        adjustment.attitude_clock = readings.supported == Some(Cause::AttitudeClock);
+    }
+    adjustment
 }
 
 /// Keys of one model are not used by the other.
@@ -198,6 +212,7 @@ fn keys_of_the_model(checked: &AdjustmentConfig, keys: &mut Keys<'_, '_>) {
             "orbit_of_pedr",
             "relief_for_plan",
             "attitude_clock",
+            "readings",
             "attitude_clock_sigma_s",
             "attitude_clock_rotation_sigma_arcsec",
             "common_bus",
@@ -209,6 +224,9 @@ fn keys_of_the_model(checked: &AdjustmentConfig, keys: &mut Keys<'_, '_>) {
     let reason = format!("adjustment.model is {:?}", checked.model.word());
     for key in others {
         keys.unused(key, &reason);
+    }
+    if checked.readings.is_some() && checked.model == AdjustmentModel::MolaSurface {
+        keys.unused("attitude_clock", "adjustment.readings decides");
     }
 }
 

@@ -39,6 +39,7 @@ mod pointing;
 mod problems;
 mod products;
 mod range_check;
+mod readings;
 mod service;
 mod shots;
 mod site;
@@ -78,6 +79,7 @@ pub use pointing::{PointingConfig, UsedBias};
 pub use problems::Problems;
 pub use products::{ProductsConfig, ShotFormat};
 pub use range_check::{RangeCheckConfig, SCAN_STEPS_MAX};
+pub use readings::ReadingsDecision;
 pub use service::{
     AlertKind, ChangesConfig, FetchConfig, FreshnessConfig, HookConfig, HttpConfig, MovedConfig,
     RetentionConfig, ScheduleConfig, ServiceConfig, ServiceInputs, ServiceOutputs, WorkersConfig,

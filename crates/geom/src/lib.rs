@@ -51,6 +51,7 @@ pub mod polynomial;
 pub mod pushbroom;
 pub mod random;
 pub mod range_residuals;
+pub mod readings;
 pub mod robust;
 pub mod scattered_heights;
 pub mod statistics;

@@ -27,7 +27,7 @@ use areograph_geom::{
 use areograph_stages::{
     adjust::{AdjustmentSummary, CorrectedImage, HeightSummary, PointKind, ReliefSummary},
     check_heights::{HeightCheck, ProfilesApart, SurfaceFigures},
-    compare_pairs::{PairComparison, ProfileByTies},
+    compare_pairs::{AlongTrack, PairComparison, ProfileByTies},
     intersect::{ImageResiduals, IntersectedTies},
 };
 use boresight::BoresightDocument;
@@ -136,6 +136,8 @@ struct PairDocument<'a> {
     residuals: &'a [ResidualMoments; 2],
     #[schemars(range(min = 0.0))]
     along_track_parallax_m: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    along_track: Option<&'a AlongTrack>,
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     mola_spacing_m: Option<f64>,
@@ -372,6 +374,7 @@ fn pair(pair: &PairComparison) -> PairDocument<'_> {
         pixel_size_m: pair.pixel_size_m,
         residuals: &pair.residuals,
         along_track_parallax_m: pair.along_track_parallax_m,
+        along_track: pair.along_track.as_ref(),
         mola_spacing_m: pair.mola_spacing_m,
         footprints: pair.footprints.as_ref().map(|by_ties| FootprintsDocument {
             order: by_ties.order,

@@ -150,6 +150,7 @@ impl DayErrors {
             Misregistration::AttitudeClock { sigma_s } => {
                 (0.0, sigma_s * Random::new(seed, "attitude clock").normal())
             }
+            Misregistration::AttitudeClockOffset { offset_s } => (0.0, offset_s),
         };
         let normal = |random: &mut Random| Vector3::from_fn(|_axis, _column| random.normal());
         let none = Vector3::zeros();
@@ -327,7 +328,7 @@ mod tests {
 
     #[test]
     fn a_clock_offset_is_that_of_all_images() {
-        let errors = SceneErrors::realistic(Roughness::Plains).with_attitude_clock();
+        let errors = SceneErrors::realistic(Roughness::Plains).with_attitude_clock(None);
         let [first, second] = [0, 3].map(|image| DayErrors::draw(&errors, &arc(&IMAGES[image]), 5));
         assert_eq!(
             first.attitude_clock_s.to_bits(),

@@ -47,6 +47,11 @@ pub enum Misregistration {
         /// Standard deviation, seconds.
         sigma_s: f64,
     },
+    /// The same with this offset, so that missions may share it.
+    AttitudeClockOffset {
+        /// Offset, seconds.
+        offset_s: f64,
+    },
 }
 
 /// Object of the position error.
@@ -313,6 +318,11 @@ impl SceneErrors {
             Misregistration::AttitudeClock { sigma_s } => Misregistration::AttitudeClock {
                 sigma_s: sigma_s * within(0.7, 1.4),
             },
+            Misregistration::AttitudeClockOffset { offset_s } => {
+                // As many numbers as above: the other sizes do not depend on the cause.
+                within(0.7, 1.4);
+                Misregistration::AttitudeClockOffset { offset_s }
+            }
         };
         let orbit = within(0.2, 0.6);
         let position = match self.position {
@@ -366,7 +376,7 @@ impl SceneErrors {
         }
     }
 
-    /// These errors, with a common attitude clock offset as the cause of misregistration.
+    /// These errors, with a common attitude clock offset as the cause of misregistration: `offset_s`, or one that is drawn.
     ///
     /// # Source
     /// 0.73 s: the time in which nadir-pointing buses rotate by the 225 to 271 m of Shan et al. 2005, Table 5, if the
@@ -374,9 +384,12 @@ impl SceneErrors {
     /// are then at most 0.1 mrad, 38 m on the ground: a clock that explains the misregistration of pairs leaves no
     /// more.
     #[must_use]
-    pub const fn with_attitude_clock(self) -> Self {
+    pub const fn with_attitude_clock(self, offset_s: Option<f64>) -> Self {
         Self {
-            misregistration: Misregistration::AttitudeClock { sigma_s: 0.73 },
+            misregistration: match offset_s {
+                Some(offset_s) => Misregistration::AttitudeClockOffset { offset_s },
+                None => Misregistration::AttitudeClock { sigma_s: 0.73 },
+            },
             attitude: AttitudeErrors {
                 constant_sigma_rad: [1e-4; 3],
                 ..self.attitude

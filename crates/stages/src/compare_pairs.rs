@@ -1,6 +1,7 @@
 //! Every pair of images: its geometry, the disagreement of footprints and tie points in it, and the resulting
 //! uncertainty of ground points.
 
+mod along_track;
 mod budget;
 mod footprint_heights;
 
@@ -17,7 +18,9 @@ use super::{
     site_image::SiteImages,
 };
 use crate::oriented::OrientedImage;
-use areograph_base::{error::Result, footprints::Footprints, frames::BodyFixed, ties::TiePoint};
+use areograph_base::{
+    body::BodyModel, error::Result, footprints::Footprints, frames::BodyFixed, ties::TiePoint,
+};
 use areograph_geom::{
     ellipsoid::spherical_to_xyz_m,
     misregistration::{ImageToImage, Pair},
@@ -31,6 +34,7 @@ use areograph_store::{
     stage_inputs,
 };
 
+pub use along_track::AlongTrack;
 use budget::{apart, budget_input, moments_of};
 pub use footprint_heights::FootprintHeight;
 use footprint_heights::footprint_heights;
@@ -54,6 +58,9 @@ pub struct PairComparison {
     pub residuals: [ResidualMoments; 2],
     /// Along-track parallax of the tie points, metres, mean, from their reprojection residuals in both images.
     pub along_track_parallax_m: f64,
+    /// The displacement with its sign, and its dependence on errors of times and attitudes; `None` where the images were not
+    /// flown in one direction, or are not apart across the track.
+    pub along_track: Option<AlongTrack>,
     /// Footprints against tie points; `None` where tie points determine no transformation.
     pub footprints: Option<FootprintsByTies>,
     /// Median distance of successive footprints, metres; `None` without any.
@@ -132,7 +139,7 @@ stage_inputs! {
 
 impl Stage for ComparePairs<'_> {
     const NAME: &'static str = "compare_pairs";
-    const METHOD: u32 = 6;
+    const METHOD: u32 = 7;
     type Output = Vec<PairComparison>;
     stage_inputs!(fingerprint);
 
@@ -195,7 +202,13 @@ pub fn compare_pairs<M: ExteriorOrientation>(
                 line_spacing_m[1],
             );
             let mola_spacing_m = median(spacings.iter().flatten().copied());
-            pairs.push(shared.compare(images, line_spacing_m, by_ties, mola_spacing_m));
+            pairs.push(shared.compare(
+                images,
+                footprints.body.model(),
+                line_spacing_m,
+                by_ties,
+                mola_spacing_m,
+            ));
         }
     }
     pairs
@@ -241,6 +254,7 @@ impl<'a> Shared<'a> {
     fn compare<M: ExteriorOrientation>(
         &self,
         images: &[OrientedCamera<M>],
+        body: &BodyModel,
         line_spacing_m: [f64; 2],
         footprints: Option<FootprintsByTies>,
         mola_spacing_m: Option<f64>,
@@ -271,7 +285,9 @@ impl<'a> Shared<'a> {
             line_spacing_m,
             height_over_base,
         );
+        let along_track = AlongTrack::of(&self.points, pair, body, line_spacing_m, pixel_size_m);
         PairComparison {
+            along_track,
             images: pair.map(|image| image.id.clone()),
             ties: u32::try_from(self.points.len()).unwrap_or(u32::MAX),
             convergence_rad: self.each(|point, _| point.convergence_rad),

@@ -44,4 +44,4 @@ use shared::invented_pair;
 pub use shared::{
     camera_lines, image_pixels, line_camera, mola_surface, orientation, oriented, site_image,
 };
-use shared::{ground, image_view, shot_heights};
+use shared::{ground, image_view, shot_heights, turn};

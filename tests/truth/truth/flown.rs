@@ -20,7 +20,7 @@ use super::{
     common::{case::Case, json},
     local,
     misregistration::{true_camera, true_footprints_m},
-    run, table, texts,
+    run, table, texts, vector,
 };
 
 /// Errors of one kind of point of a site, towards east, north and up, metres.
@@ -45,6 +45,8 @@ pub(super) struct Site {
     pub(super) has_misplaced_profile: bool,
     /// Number of misplaced further passes and of those that are rejected; the same of correctly placed ones.
     pub(super) further: [[usize; 2]; 2],
+    /// Shifts of correctly placed further passes by crossovers, east, north and height: errors over stated standard deviations.
+    pub(super) shifts: Vec<[f64; 3]>,
     /// What the adjustment states; nothing where there is none.
     pub(super) stated: Option<Stated>,
 }
@@ -186,29 +188,48 @@ fn clocks(truth: &Value, folder: &Path) -> [Vec<Pair>; 2] {
     found
 }
 
-/// Misplaced further passes over a site, and correctly placed ones: their number, and how many the profile check rejects.
-fn further(truth: &Value, folder: &Path, site: &str) -> [[usize; 2]; 2] {
-    let checked = json(&folder.join("profiles.json"));
-    let rejected: Vec<&str> = checked["left_out"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(|of| of["profile"].as_str().unwrap())
-        .collect();
-    let mut counts = [[0; 2]; 2];
-    for profile in truth["profiles"].as_array().unwrap() {
+/// Further passes over a site: names of their profiles, and their true shifts.
+fn passes<'a>(truth: &'a Value, site: &'a str) -> impl Iterator<Item = (String, &'a Value)> {
+    let profiles = truth["profiles"].as_array().unwrap().iter();
+    profiles.filter_map(move |profile| {
         let shift = &profile["profile_shift"];
         if profile["window"] != site || shift.is_null() || profile["et_s"][0].is_null() {
-            continue;
+            return None;
         }
         // `ap20001l.b` holds orbit 10001.
         let number: u32 = profile["file"].as_str().unwrap()[2..7].parse().unwrap();
-        let name = format!("{site}/{}", number - 10_000);
+        Some((format!("{site}/{}", number - 10_000), shift))
+    })
+}
+
+/// Misplaced further passes over a site, and correctly placed ones: their number, and how many the profile check rejects.
+fn further(truth: &Value, folder: &Path, site: &str) -> [[usize; 2]; 2] {
+    let checked = json(&folder.join("profiles.json"));
+    let rejected = checked["left_out"].as_array().unwrap();
+    let mut counts = [[0; 2]; 2];
+    for (name, shift) in passes(truth, site) {
         let [all, found] = &mut counts[usize::from(shift["is_misplaced"] != true)];
         *all += 1;
-        *found += usize::from(rejected.contains(&name.as_str()));
+        *found += usize::from(rejected.iter().any(|of| of["profile"] == *name));
     }
     counts
+}
+
+/// Shifts of correctly placed further passes as stated, against the truth.
+fn shifts(truth: &Value, folder: &Path, site: &str) -> Vec<[f64; 3]> {
+    let checked = json(&folder.join("profiles.json"));
+    let stated = checked["shifts"].as_array().unwrap();
+    let placed = passes(truth, site).filter(|(_, shift)| shift["is_misplaced"] != true);
+    let of_pass =
+        placed.filter_map(|(name, shift)| {
+            let own = stated.iter().find(|of| of["profile"] == *name)?;
+            let true_m = vector(&shift["east_north_radial_m"]);
+            let off_m = vector(&own["shift_m"]) - true_m;
+            Some([0, 1, 2].map(|axis| {
+                off_m[axis] / own["covariance_m2"][axis][axis].as_f64().unwrap().sqrt()
+            }))
+        });
+    of_pass.collect()
 }
 
 /// Sizes of the errors of a mission.
@@ -342,6 +363,7 @@ impl Plan<'_> {
             verdict,
             has_misplaced_profile,
             further: further(truth, &folder, site),
+            shifts: shifts(truth, &folder, site),
             stated,
         }
     }

@@ -211,6 +211,19 @@ fn the_position_by_the_relief_under_many_profiles_holds() {
             "{name}: {beyond} beyond 3 sigma"
         );
     }
+    for (axis, name) in ["east", "north", "height"].into_iter().enumerate() {
+        let shifts = rows.iter().flat_map(|row| &row.sites);
+        let z: Vec<f64> = shifts
+            .flat_map(|site| site.shifts.iter().map(|z| z[axis]))
+            .collect();
+        let pooled = (z.iter().map(|z| z * z).sum::<f64>() / z.len() as f64).sqrt();
+        println!("shifts by crossovers, {name}: {pooled:.2} of {}", z.len());
+        // A mission draws a scatter of 50 to 100 m; 70 m are assumed.
+        assert!(
+            (0.6..1.5).contains(&pooled) && z.len() > 30,
+            "{name}: {pooled}"
+        );
+    }
     // A shift of 250 m, 3.5 assumed standard deviations, looks like another place.
     assert!(100 * refused <= placed.max(100), "{refused} of {placed}");
     if long() {

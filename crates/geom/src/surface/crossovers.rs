@@ -12,8 +12,6 @@ use super::{
 const CELL_M: f64 = 1_000.0;
 /// Successive shots on either side of a segment whose differences give the roughness there.
 const AROUND: usize = 4;
-/// Profiles that cross at a smaller angle do not give the slope of the ground, radians.
-const ANGLE_MIN_RAD: f64 = 0.05;
 
 /// A place where two profiles cross.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,8 +27,10 @@ pub struct Crossover {
     /// Standard deviation of this difference by the noise of four shots and by the ground between them, metres: without
     /// the errors that the shots of a profile share.
     pub sigma_m: f64,
-    /// Slope of the ground towards east and north, metres per metre; zero for profiles that are almost parallel.
+    /// Expected change of the ground towards east and north, metres per metre, from the slopes along both profiles.
     pub slope: Vector2<f64>,
+    /// Standard deviation of the difference by shifts of both profiles in plan that `slope` does not predict, metres.
+    pub beyond_slope_m: f64,
     /// Root mean square slope along the two profiles, metres per metre: more certain than the slope across them.
     pub slope_along: f64,
 }
@@ -43,8 +43,9 @@ struct Segment<'a> {
     at: usize,
     /// Mean square difference of successive heights around it, without noise, m².
     rough_m2: f64,
-    /// Slope along it, metres per metre.
+    /// Slope along it, metres per metre, between shots this far apart, metres.
     slope: f64,
+    slope_base_m: f64,
 }
 
 /// Every crossing of two profiles, in the order of the profiles.
@@ -111,13 +112,14 @@ fn segments(placed: &[Placed], shot_sigma_m: f64) -> Vec<Segment<'_>> {
                     &profile[index.saturating_sub(1)],
                     &profile[(index + 2).min(profile.len() - 1)],
                 ];
-                let wide_m = (wide[1].plan_m - wide[0].plan_m).norm();
+                let wide_m = (wide[1].plan_m - wide[0].plan_m).norm().max(length_m);
                 segments.push(Segment {
                     from: &pair[0],
                     to: &pair[1],
                     at: first + index,
                     rough_m2: (mean_m2 - 2.0 * shot_sigma_m.powi(2)).max(0.0),
-                    slope: (wide[1].height_m - wide[0].height_m) / wide_m.max(length_m),
+                    slope: (wide[1].height_m - wide[0].height_m) / wide_m,
+                    slope_base_m: wide_m,
                 });
             }
         }
@@ -159,14 +161,7 @@ fn crossover(
         let of_ground = rest * share.powf(exponent) + share * rest.powf(exponent) - rest * share;
         variance_m2 += noise * options.shot_sigma_m.powi(2) + of_ground * segment.rough_m2;
     }
-    let directions = segments.map(|of| (of.to.plan_m - of.from.plan_m).normalize());
-    let slope = if directions[0].perp(&directions[1]).abs() < ANGLE_MIN_RAD {
-        Vector2::zeros()
-    } else {
-        let along = Vector2::new(segments[0].slope, segments[1].slope);
-        let axes = Matrix2::from_rows(&directions.map(|direction| direction.transpose()));
-        axes.try_inverse().unwrap_or_default() * along
-    };
+    let (slope, beyond_slope_m) = expected_slope(segments, options);
     let profiles = segments.map(|segment| segment.from.profile);
     let shared = segments.map(|segment| segment.from.shared);
     let (profiles, shared, sign) = if profiles[0] < profiles[1] {
@@ -181,8 +176,47 @@ fn crossover(
         difference_m: sign * (heights_m[0] - heights_m[1]),
         sigma_m: variance_m2.sqrt(),
         slope,
+        beyond_slope_m,
         slope_along: (0.5 * segments.map(|of| of.slope.powi(2)).iter().sum::<f64>()).sqrt(),
     }
+}
+
+/// Best linear prediction of the change of the ground with a shift by the slopes along two segments, metres per metre to the east and
+/// north, and the standard deviation of the difference by shifts of both profiles that it does not predict, metres.
+///
+/// Both slopes are treated as centred on the crossing. The slopes between shots `L` apart in the directions `u₁` and `u₂`, at the
+/// angle θ, have the variance `2 γ(L) / L²` and the covariance `2 (γ(L cos ½θ) − γ(L sin ½θ)) / L²`; noise of the shots adds to the
+/// variance. Their covariance with the change under a small shift `s` is `2 γ′(½L) uᵢ·s / L`. Profiles that cross at a small angle
+/// determine the slope across them poorly.
+///
+/// # Source
+/// Linear prediction from increments: Cressie 1993, Statistics for spatial data, chapter 3.
+fn expected_slope(segments: [&Segment; 2], options: &SurfaceOptions) -> (Vector2<f64>, f64) {
+    let along = segments.map(|of| of.to.plan_m - of.from.plan_m);
+    let length_m = 0.5 * (along[0].norm() + along[1].norm());
+    let rough_m2 = 0.5 * (segments[0].rough_m2 + segments[1].rough_m2);
+    let of_unit = Variogram { roughness_m: 1.0 };
+    let variogram = Variogram {
+        roughness_m: (rough_m2 / (2.0 * of_unit.at(length_m))).sqrt(),
+    };
+    let base_m = 0.5 * (segments[0].slope_base_m + segments[1].slope_base_m);
+    let [first, second] = along.map(|along| along.normalize());
+    let variance = 2.0 * (variogram.at(base_m) + options.shot_sigma_m.powi(2)) / base_m.powi(2);
+    let [cosine_m2, sine_m2] =
+        [first + second, first - second].map(|of| variogram.at(0.5 * base_m * of.norm()));
+    let between = 2.0 * (cosine_m2 - sine_m2) / base_m.powi(2);
+    let covariance = Matrix2::new(variance, between, between, variance);
+    // γ′(d) = 2H γ(d) / d, for `d` = ½L.
+    let by_shift = 8.0 * Variogram::HURST * variogram.at(0.5 * base_m) / base_m.powi(2);
+    let with_shift = Matrix2::from_columns(&[first, second]) * by_shift;
+    let prediction = with_shift * covariance.try_inverse().unwrap_or_default();
+    let slopes = Vector2::new(segments[0].slope, segments[1].slope);
+    // The difference depends on the shift of one profile against the other, on each axis.
+    let [one, other] = segments.map(|of| of.from.shared.plan);
+    let apart_m = options.profile_plan_sigma_m * one.hypot(other);
+    let all_m2 = 2.0 * variogram.at(std::f64::consts::SQRT_2 * apart_m);
+    let predicted_m2 = (prediction * with_shift.transpose()).trace() * apart_m.powi(2);
+    (prediction * slopes, (all_m2 - predicted_m2).max(0.0).sqrt())
 }
 
 #[allow(

@@ -173,6 +173,16 @@ impl<'a> Net<'a> {
         }
     }
 
+    /// Variance of a difference by everything that the unknowns do not describe, m².
+    fn variance_m2(&self, crossover: &Crossover) -> f64 {
+        let beyond_slope_m = if self.unknowns == 1 {
+            0.0
+        } else {
+            crossover.beyond_slope_m
+        };
+        crossover.sigma_m.powi(2) + beyond_slope_m.powi(2)
+    }
+
     /// Solves for the shifts, and weighs the crossovers by their residuals; false when a number is not finite.
     fn step(&mut self, sigmas_m: &[f64]) -> bool {
         let unknowns = self.shifts.len();
@@ -194,7 +204,7 @@ impl<'a> Net<'a> {
         for ((crossover, columns), weight) in
             self.crossovers.iter().zip(&self.columns).zip(&self.weights)
         {
-            let weight = weight / crossover.sigma_m.powi(2);
+            let weight = weight / self.variance_m2(crossover);
             let row = self.row(crossover, *columns);
             for (column, value) in &row {
                 right[*column] += weight * value * crossover.difference_m;
@@ -214,7 +224,7 @@ impl<'a> Net<'a> {
                 .iter()
                 .map(|(column, value)| value * self.shifts[*column]);
             let left_m = crossover.difference_m - by_shifts.sum::<f64>();
-            self.weights[index] = student_weight((left_m / crossover.sigma_m).powi(2));
+            self.weights[index] = student_weight(left_m.powi(2) / self.variance_m2(crossover));
         }
         self.shifts.iter().all(|shift_m| shift_m.is_finite())
     }

@@ -38,7 +38,7 @@ pub use images::{ImageDifference, ImageMovement, SampleMovement};
 pub use items::{ChangedItem, Item, Items};
 pub use limits::Limits;
 pub use movement::{Component, Size};
-pub use outputs::{Pairs, pairs};
+pub use outputs::{Pairs, pairs, sites};
 pub use places::Moved;
 pub use words::quantity;
 

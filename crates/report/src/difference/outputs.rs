@@ -76,7 +76,10 @@ fn common(a: &Path, b: &Path) -> Result<Pairs> {
 }
 
 /// Folders of sites in `root`, by name.
-fn sites(root: &Path) -> Result<BTreeMap<String, PathBuf>> {
+///
+/// # Errors
+/// A folder without products, or one that cannot be read.
+pub fn sites(root: &Path) -> Result<BTreeMap<String, PathBuf>> {
     let mut sites = BTreeMap::new();
     let entries = fs::read_dir(root)
         .map_err(IoError::on("read the folder"))

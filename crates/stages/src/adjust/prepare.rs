@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     group_profiles::Profile, orientation::Orientation, register::ImageRegistration,
-    tag_times::ImageTimes,
+    tag_times::ImageTimes, turn::turn_rad_s,
 };
 use areograph_base::{
     footprints::{AdjustmentModel, Footprints},
@@ -24,8 +24,8 @@ use areograph_base::{
 };
 use areograph_config::AdjustmentConfig;
 use areograph_geom::{
-    attitude::rotation_vector, body_rotation::spin_rad_s, bundle::ORIENTATION_UNKNOWNS,
-    ellipsoid::spherical_to_xyz_m, orbit_axes::radial_along_cross, oriented_camera::OrientedCamera,
+    body_rotation::spin_rad_s, bundle::ORIENTATION_UNKNOWNS, ellipsoid::spherical_to_xyz_m,
+    orbit_axes::radial_along_cross, oriented_camera::OrientedCamera,
     pushbroom::ExteriorOrientation, surface::LaserSurface,
 };
 
@@ -73,7 +73,7 @@ impl<M: ExteriorOrientation> Candidate<'_, M> {
         let rotation = rotation.unwrap_or(config.rotation_unknowns);
         hold_powers(&mut sigmas, position, rotation);
         AdjustImage {
-            turn_rad_s: self.turn_rad_s(),
+            turn_rad_s: turn_rad_s(&self.oriented_camera, self.times.body.model()),
             laser_axes: laser
                 .axes_in_bus()
                 .filter(|_| self.knows_bus())
@@ -111,17 +111,6 @@ impl<M: ExteriorOrientation> Candidate<'_, M> {
         let velocity_m_s =
             over_ground_m_s + spin_rad_s(self.times.body.model()).cross(&pose.position_m);
         radial_along_cross(&pose.position_m, &velocity_m_s)
-    }
-
-    /// Rotation rate of the camera relative to inertial space over the image, camera components, radians per second.
-    fn turn_rad_s(&self) -> Vector3<f64> {
-        let half_lines = 0.5 * self.oriented_camera.lines();
-        let orientation = &self.oriented_camera.orientation;
-        let [before, middle, after] =
-            [-half_lines, 0.0, half_lines].map(|x| orientation.pose(x).mars_to_camera);
-        let duration_s = 2.0 * half_lines * self.times.line_times.mean_period_s();
-        let against_mars = rotation_vector(&(after * before.transpose())) / duration_s;
-        against_mars - middle * spin_rad_s(self.times.body.model())
     }
 
     /// Position unknowns get the standard deviation of nadir or of other images; rotations get the angle that moves the

@@ -7,7 +7,10 @@ use crate::{
 };
 use areograph_base::{footprints::AdjustmentModel, minus::signed, terms::Terms};
 use areograph_config::LimitsConfig;
-use areograph_geom::statistics::{NORMAL_MAD, median};
+use areograph_geom::{
+    readings::Cause,
+    statistics::{NORMAL_MAD, median},
+};
 
 /// Mean heights with a larger standard deviation than this, metres, are hardly controlled.
 pub(super) const HEIGHT_LOOSE_M: f64 = 20.0;
@@ -295,6 +298,43 @@ impl AdjustmentEvidence<'_> {
                 .all(|pair| is_together(pair, limit_m))
     }
 
+    /// The decision on the cause of along-track disagreements that positions depend on, one sentence.
+    fn cause_of_disagreement(&self, evidence: &Evidence<'_>) -> Option<String> {
+        let by_clock = self.adjusted.attitude_clock_s.is_some();
+        let readings = evidence.beam.adjustment.readings.as_ref();
+        let is_used = self.adjusted.summary.model == AdjustmentModel::MolaSurface;
+        let Some(readings) = readings.filter(|_| is_used) else {
+            return by_clock.then(|| {
+                "positions depend on adjustment.attitude_clock, an interpretation of the disagreement between the \
+                 images that no measurement tests; the report also gives the other interpretation"
+                    .to_owned()
+            });
+        };
+        let (pairs, supports, decides) = match readings.pairs {
+            1 => ("1 pair of images".to_owned(), "supports", "does not decide"),
+            pairs => (
+                format!("{pairs} pairs of images"),
+                "support",
+                "do not decide",
+            ),
+        };
+        // Of a supported cause it is positive.
+        let odds = readings.log_odds_of_supported() / std::f64::consts::LN_10;
+        Some(match readings.supported {
+            Some(Cause::AttitudeClock) => format!(
+                "positions depend on adjustment.readings: {pairs} {supports} one offset of the attitude clock (odds 10^{odds:.1} to 1); the \
+                 report also gives the other interpretation"
+            ),
+            Some(Cause::SingleImages) => format!(
+                "positions depend on adjustment.readings: {pairs} {supports} independent errors of single images (odds 10^{odds:.1} to 1)"
+            ),
+            None => format!(
+                "positions depend on adjustment.readings: {pairs} {decides} the cause of along-track disagreements, so that all images \
+                 are taken as equally likely to be in error"
+            ),
+        })
+    }
+
     /// Points that the reader must weigh, one sentence each.
     pub(super) fn remarks(&self, evidence: &Evidence<'_>) -> Vec<String> {
         let limits = evidence.limits;
@@ -316,13 +356,7 @@ impl AdjustmentEvidence<'_> {
                     .to_owned(),
             );
         }
-        if self.adjusted.attitude_clock_s.is_some() {
-            remarks.push(
-                "positions depend on adjustment.attitude_clock, an interpretation of the disagreement between the \
-                 images that no measurement tests; the report also gives the other interpretation"
-                    .to_owned(),
-            );
-        }
+        remarks.extend(self.cause_of_disagreement(evidence));
         if matches!(self.adjusted.boresight, Some(Ok(_))) {
             remarks.push(
                 "across-track positions depend on adjustment.common_bus, which assumes that footprints do not contain \

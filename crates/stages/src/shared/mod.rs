@@ -12,3 +12,4 @@ pub mod orientation;
 pub mod oriented;
 pub(crate) mod shot_heights;
 pub mod site_image;
+pub(crate) mod turn;

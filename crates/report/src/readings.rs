@@ -1,0 +1,196 @@
+//! The page of causes of the along-track disagreement, compared over many pairs.
+
+use super::{
+    html::{Cell, Column, Markup, Section, Table, Tone, html, list, page, paragraph, verdict},
+    numbers::signed,
+    plots::{Panel, Plot, Series, figure, label},
+};
+use areograph_base::{
+    error::Result,
+    units::{RADIANS_PER_ARCSECOND, SECONDS_PER_MS},
+};
+use areograph_geom::readings::{
+    Cause, CausesCompared, DECISIVE_ODDS, PairDisagreement, ReadingSigmas,
+};
+
+/// A pair of a site.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReadPair {
+    /// The site.
+    pub site: String,
+    /// The disagreement of its images.
+    pub disagreement: PairDisagreement,
+}
+
+/// Contents of the page.
+#[derive(Debug, Clone, Copy)]
+pub struct ReadingsReport<'a> {
+    /// The pairs.
+    pub pairs: &'a [ReadPair],
+    /// Pairs and sites that are not used, each with the reason.
+    pub without: &'a [(String, String)],
+    /// A priori standard deviations.
+    pub sigmas: &'a ReadingSigmas,
+    /// The result.
+    pub compared: &'a CausesCompared,
+}
+
+impl ReadingsReport<'_> {
+    /// The result in one sentence.
+    #[must_use]
+    pub fn headline(&self) -> String {
+        let (of, decides) = match self.pairs.len() {
+            1 => ("One pair of images".to_owned(), "does not decide"),
+            count => (format!("{count} pairs of images"), "do not decide"),
+        };
+        match self.compared.supported() {
+            Some(Cause::AttitudeClock) => {
+                format!("{of}: one offset of the attitude clock, {}.", self.clock())
+            }
+            Some(Cause::SingleImages) => format!(
+                "{of}: independent errors of single images, not one offset of the attitude clock."
+            ),
+            None => format!(
+                "{of} {decides} between errors of single images and one offset of the attitude clock."
+            ),
+        }
+    }
+
+    /// The odds of the causes, one sentence each.
+    #[must_use]
+    pub fn odds(&self) -> [String; 2] {
+        let of = |cause: &str, log_odds: f64, others: &str| {
+            let (times, comparison) = if log_odds >= 0.0 {
+                (log_odds, "more")
+            } else {
+                (-log_odds, "less")
+            };
+            format!(
+                "{cause} is {} times {comparison} probable than {others}.",
+                odds(times)
+            )
+        };
+        [
+            of(
+                "One offset of the attitude clock",
+                self.compared.log_odds_of_clock(),
+                "errors of single images alone",
+            ),
+            of(
+                "The hypothesis of large errors of single images",
+                self.compared.log_odds_of_images(),
+                "that of small ones, with or without an offset",
+            ) + &format!(
+                " A decision requires odds of {DECISIVE_ODDS} to 1, and that both causes together are less probable."
+            ),
+        ]
+    }
+
+    fn clock(&self) -> String {
+        let CausesCompared {
+            clock_s,
+            clock_sigma_s,
+            ..
+        } = self.compared;
+        format!("{} ± {} s", signed(*clock_s, 2), label(*clock_sigma_s, 2))
+    }
+}
+
+/// Odds with two digits, or a power of 10 where these would be many.
+fn odds(logarithm: f64) -> String {
+    let odds = logarithm.exp();
+    if odds < 1e4 {
+        label(odds, usize::from(odds < 10.0))
+    } else {
+        format!(
+            "10^{}",
+            label((logarithm / std::f64::consts::LN_10).floor(), 0)
+        )
+    }
+}
+
+/// Two readings, compared, as one HTML page.
+///
+/// # Errors
+/// A plot that cannot be drawn, which is a bug in areograph.
+pub fn readings_page(report: &ReadingsReport) -> Result<String> {
+    let tone = match report.compared.supported() {
+        Some(_) => Tone::Good,
+        None => Tone::Remarks,
+    };
+    let sigmas = report.sigmas;
+    let words = format!(
+        "A priori standard deviations: large errors of single images as line times of {} ms, small ones as rotations of {}\u{2033}, \
+         both within a factor of √2; clock offset {} s. Offset of the attitude clock, if it is the cause: {}.",
+        label(sigmas.line_time_s / SECONDS_PER_MS, 1),
+        label(sigmas.rotation_rad / RADIANS_PER_ARCSECOND, 1),
+        label(sigmas.clock_s, 2),
+        report.clock(),
+    );
+    let without: Vec<String> = report
+        .without
+        .iter()
+        .map(|(site, reason)| format!("{site}: {reason}"))
+        .collect();
+    let odds = report.odds().join(" ");
+    let body = html! { p { (odds) " " (words) } (list(&without)) };
+    let lead = verdict(tone, &report.headline(), &body);
+    let sections = [Section::new("Pairs", pairs(report)?)];
+    Ok(page("Cause of along-track disagreements", &lead, &sections))
+}
+
+fn pairs(report: &ReadingsReport) -> Result<Markup> {
+    let columns = &[
+        Column::Text("site"),
+        Column::Text("images"),
+        Column::Number("apart, m"),
+        Column::Number("σ, m"),
+        Column::Number("by the clock, m/s"),
+        Column::Number("left by the clock, m"),
+    ];
+    let mut table = Table::new(
+        "Displacement along the track, first minus second image",
+        columns,
+    );
+    let pairs = report.pairs.iter().zip(&report.compared.left_m);
+    for (pair, left_m) in pairs {
+        let of = &pair.disagreement;
+        let cells: Vec<Cell> = vec![
+            pair.site.as_str().into(),
+            of.images.join(", ").into(),
+            signed(of.apart_m, 1).into(),
+            label(of.sigma_m, 1).into(),
+            signed(of.clock_m_s, 0).into(),
+            signed(*left_m, 1).into(),
+        ];
+        table.row(true, cells);
+    }
+    let dots = report.pairs.iter();
+    let dots = dots.map(|pair| (pair.disagreement.clock_m_s, pair.disagreement.apart_m));
+    let dots: Vec<(f64, f64)> = dots.collect();
+    let ends = dots.iter().map(|dot| dot.0);
+    let (least, most) = ends.fold((0.0_f64, 0.0_f64), |(least, most), x| {
+        (least.min(x), most.max(x))
+    });
+    let expected = [least, most].map(|x| (x, x * report.compared.clock_s));
+    let panel = Panel::of(
+        "apart, m",
+        vec![
+            Series::line("by the estimated offset", 1, expected.to_vec()),
+            Series::dots("pairs", 0, dots),
+        ],
+    );
+    let caption = "Displacement of the images of each pair against its change with the attitude clock. One offset places the pairs \
+                   on a line through 0; independent errors of single images scatter them about 0.";
+    let plot = Plot::of(
+        "Displacement and attitude clock".to_owned(),
+        caption.to_owned(),
+        "change with the attitude clock, m/s",
+        vec![panel],
+    );
+    let words = paragraph(
+        "Positions of tie points by the two images, with the orientation from the kernels. Images that follow nadir are displaced \
+         by an offset of the attitude clock, inertially held images are not.",
+    );
+    Ok(html! { (words) (table.finish()) (figure(&plot)?) })
+}
