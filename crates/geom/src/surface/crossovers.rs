@@ -226,3 +226,62 @@ fn expected_slope(segments: [&Segment; 2], options: &SurfaceOptions) -> (Vector2
 fn cell(place_m: &Vector2<f64>) -> [i64; 2] {
     [place_m.x, place_m.y].map(|component_m| (component_m / CELL_M).floor() as i64)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Expected slope and what it leaves, of segments that cross at this angle on either side of north, on ground of this roughness, with
+    /// these slopes along them.
+    fn expected(angle_rad: f64, rough_m: f64, slopes: [f64; 2]) -> (Vector2<f64>, f64) {
+        let placed = |plan_m: Vector2<f64>, profile: usize| Placed {
+            plan_m,
+            height_m: 0.0,
+            profile,
+            shared: SharedErrors::LEAST,
+        };
+        let half_rad = 0.5 * angle_rad;
+        let ends = [half_rad, -half_rad]
+            .map(|angle_rad| 150.0 * Vector2::new(angle_rad.sin(), angle_rad.cos()));
+        let shots: Vec<[Placed; 2]> = ends
+            .iter()
+            .enumerate()
+            .map(|(profile, end_m)| [placed(-end_m, profile), placed(*end_m, profile)])
+            .collect();
+        let segment = |index: usize| Segment {
+            from: &shots[index][0],
+            to: &shots[index][1],
+            at: 2 * index,
+            rough_m2: rough_m.powi(2),
+            slope: slopes[index],
+            slope_base_m: 900.0,
+        };
+        expected_slope([&segment(0), &segment(1)], &SurfaceOptions::default())
+    }
+
+    #[test]
+    fn the_ground_across_two_profiles_is_known_the_less_the_smaller_their_angle() {
+        let right = std::f64::consts::FRAC_PI_2;
+        // Perpendicular slopes are independent: 2H · 2^(1 − 2H) of each by the variogram, less by noise of 1 m.
+        let (slope, left_m) = expected(right, 10.0, [0.02, 0.0]);
+        let share = 1.4 * 2_f64.powf(-0.4);
+        let along = Vector2::new((0.5 * right).sin(), (0.5 * right).cos());
+        assert!((slope - 0.02 * share * along).norm() < 2e-4, "{slope}");
+        // Slopes that differ along two profiles of a small angle would mean a steep slope across them; noise explains them as well.
+        let (across, left_narrow_m) = expected(0.01, 10.0, [0.001, -0.001]);
+        assert!(across.x.abs() < 0.05 && across.y.abs() < 1e-9, "{across}");
+        assert!(
+            left_narrow_m > left_m && left_m > 0.0,
+            "{left_narrow_m} {left_m}"
+        );
+        // All of the ground's change under the shift of one profile against the other, at most.
+        let all_m = 10.0 * (2.0 * 70.0 / 300.0_f64).powf(Variogram::HURST);
+        assert!(left_narrow_m < all_m, "{left_narrow_m} {all_m}");
+    }
+
+    #[test]
+    fn flat_ground_has_no_expected_slope() {
+        let (slope, left_m) = expected(0.5, 0.0, [0.0, 0.0]);
+        assert!(slope.norm() < 1e-12 && left_m < 1e-12, "{slope} {left_m}");
+    }
+}

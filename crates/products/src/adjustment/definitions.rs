@@ -1,7 +1,7 @@
 //! Definitions of the numbers of the document.
 
 /// Definitions of the numbers, for readers of the file.
-pub(super) const DEFINITIONS: [(&str, &str); 15] = [
+pub(super) const DEFINITIONS: [(&str, &str); 16] = [
     (
         "before, after",
         "results with the orientation from the kernels, and with the adjusted orientation; ground points are intersected again",
@@ -23,6 +23,13 @@ pub(super) const DEFINITIONS: [(&str, &str); 15] = [
     (
         "along_track_parallax_m",
         "mean distance along the flight between the positions of tie points according to the two images, metres",
+    ),
+    (
+        "along_track",
+        "the same with its sign, first minus second image, and its change with a rotation of each camera (range_m, metres \
+         per radian), with its line times (line_time_m_s), and with one offset of the attitude clock of both (clock_m_s), metres per \
+         second: input of areograph compare-readings. Absent where the images were not flown in one direction, or are not apart \
+         across the track",
     ),
     (
         "footprints",
