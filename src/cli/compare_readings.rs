@@ -7,7 +7,7 @@ use clap::Args;
 use super::output;
 use crate::{
     error::Error,
-    flow::{Readings, compare_readings},
+    flow::{compare_readings, readings_answer, readings_decision, usual_sigmas},
     geom::readings::ReadingSigmas,
     report::readings_page,
     store::page::PagePath,
@@ -65,7 +65,7 @@ fn sigma(text: &str) -> Result<f64, String> {
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     let page_path = arguments.page.as_deref().map(PagePath::new).transpose()?;
-    let usual = Readings::usual_sigmas();
+    let usual = usual_sigmas();
     let scaled =
         |typed: Option<f64>, unit: f64, usual: f64| typed.map_or(usual, |typed| typed * unit);
     let sigmas = ReadingSigmas {
@@ -82,21 +82,20 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
         clock_s: scaled(arguments.attitude_clock_sigma_s, 1.0, usual.clock_s),
     };
     let readings = compare_readings(&arguments.folders, sigmas)?;
-    let report = readings.report();
     if let Some(path) = &page_path {
-        path.write(&readings_page(&report)?)?;
+        path.write(&readings_page(&readings)?)?;
     }
     if arguments.json {
-        output::json(&readings.answer());
+        output::json(&readings_answer(&readings));
         return Ok(());
     }
     if arguments.toml {
-        output::text(readings.decision().to_toml().as_bytes());
+        output::text(readings_decision(&readings).to_toml().as_bytes());
         return Ok(());
     }
-    output::line(report.headline());
-    report.odds().iter().for_each(output::line);
-    for (what, reason) in report.without {
+    output::line(readings.headline());
+    readings.odds().iter().for_each(output::line);
+    for (what, reason) in &readings.not_used {
         output::line(format_args!("not used: {what}: {reason}"));
     }
     if let Some(path) = &arguments.page {

@@ -51,7 +51,7 @@ pub use observer::{Observer, StageEvent};
 pub use out::{OutError, check_out};
 pub use page::{PageAgain, page_again};
 pub use plan::{RunPlan, plan_site, plan_task};
-pub use readings::{Readings, compare_readings};
+pub use readings::{compare_readings, readings_answer, readings_decision, usual_sigmas};
 pub use run::{Ending, RunOptions, RunOutcome, run_site, run_task};
 pub use site::STAGES;
 pub use sites::publish_sites;

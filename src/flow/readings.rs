@@ -12,9 +12,9 @@ use crate::{
     config::{AdjustmentConfig, ReadingsDecision},
     difference::sites,
     error::{Cause, Result},
-    geom::readings::{CausesCompared, DECISIVE_ODDS, PairDisagreement, ReadingSigmas, compare},
+    geom::readings::{AlongTrack, DECISIVE_ODDS, PairDisagreement, ReadingSigmas, compare},
     products::PageData,
-    report::{ReadPair, ReadingsReport},
+    report::{ReadPair, Readings},
     store::published::{is_site_folder, read_published_by_this_version, still_published},
 };
 
@@ -27,112 +27,89 @@ enum ReadingsError {
     )]
     #[cause(Input: "name products of sites with such pairs")]
     NoPairs(String),
+    /// Spacecraft have clocks of their own.
+    #[error("the images are of several spacecraft: {0}; expected those of one")]
+    #[cause(Configuration: "name products of one mission")]
+    SeveralSpacecraft(String),
     /// A standard deviation is far beyond its usual size.
     #[error("the pairs and the standard deviations do not determine probabilities")]
     #[cause(Configuration: "give standard deviations of the size of their defaults")]
     NotANumber,
 }
 
-/// A comparison of the two causes.
-#[derive(Debug)]
-pub struct Readings {
-    /// The pairs, in the order of their sites, each once.
-    pub pairs: Vec<ReadPair>,
-    /// Pairs and sites that are not used, each with the reason.
-    pub without: Vec<(String, String)>,
-    /// A priori standard deviations.
-    pub sigmas: ReadingSigmas,
-    /// The result.
-    pub compared: CausesCompared,
+/// A priori standard deviations of `[adjustment]` by default.
+#[must_use]
+pub fn usual_sigmas() -> ReadingSigmas {
+    let usual = AdjustmentConfig::default();
+    ReadingSigmas {
+        line_time_s: usual.line_time_sigma_s,
+        rotation_rad: usual.attitude_clock_rotation_sigma_rad,
+        clock_s: usual.attitude_clock_sigma_s,
+    }
 }
 
-impl Readings {
-    /// A priori standard deviations of `[adjustment]` by default.
-    #[must_use]
-    pub fn usual_sigmas() -> ReadingSigmas {
-        let usual = AdjustmentConfig::default();
-        ReadingSigmas {
-            line_time_s: usual.line_time_sigma_s,
-            rotation_rad: usual.attitude_clock_rotation_sigma_rad,
-            clock_s: usual.attitude_clock_sigma_s,
-        }
+/// The result as site files name it.
+#[must_use]
+pub fn readings_decision(readings: &Readings) -> ReadingsDecision {
+    let compared = &readings.compared;
+    ReadingsDecision {
+        pairs: i32::try_from(readings.pairs.len()).unwrap_or(i32::MAX),
+        supported: compared.supported(),
+        log_odds: [compared.log_odds_of_clock(), compared.log_odds_of_images()],
+        attitude_clock_s: compared.clock_s,
+        attitude_clock_sigma_s: compared.clock_sigma_s,
     }
+}
 
-    /// Its parts, for the page.
-    #[must_use]
-    pub fn report(&self) -> ReadingsReport<'_> {
-        ReadingsReport {
-            pairs: &self.pairs,
-            without: &self.without,
-            sigmas: &self.sigmas,
-            compared: &self.compared,
-        }
-    }
-
-    /// The result as site files name it.
-    #[must_use]
-    pub fn decision(&self) -> ReadingsDecision {
-        ReadingsDecision {
-            pairs: i32::try_from(self.pairs.len()).unwrap_or(i32::MAX),
-            supported: self.compared.supported(),
-            log_odds: [
-                self.compared.log_odds_of_clock(),
-                self.compared.log_odds_of_images(),
-            ],
-            attitude_clock_s: self.compared.clock_s,
-            attitude_clock_sigma_s: self.compared.clock_sigma_s,
-        }
-    }
-
-    /// The answer for scripts.
-    #[must_use]
-    pub fn answer(&self) -> Value {
-        let pairs = self.pairs.iter().zip(&self.compared.left_m);
-        let pairs = pairs.map(|(pair, left_m)| {
-            json!({
-                "site": pair.site,
-                "images": pair.disagreement.images,
-                "apart_m": pair.disagreement.apart_m,
-                "sigma_m": pair.disagreement.sigma_m,
-                "clock_m_s": pair.disagreement.clock_m_s,
-                "range_m": pair.disagreement.range_m,
-                "line_time_m_s": pair.disagreement.line_time_m_s,
-                "left_by_clock_m": left_m,
-            })
-        });
-        let without = self.without.iter();
-        let without = without.map(|(what, reason)| json!({"what": what, "reason": reason}));
-        let [large, large_with, small, small_with] = self.compared.log_likelihoods;
-        json!({
-            "supported": self.decision().word(),
-            "log_odds_of_clock": self.compared.log_odds_of_clock(),
-            "log_odds_of_images": self.compared.log_odds_of_images(),
-            "decisive_log_odds": DECISIVE_ODDS.ln(),
-            "log_likelihoods": {
-                "large_errors_of_images": large,
-                "large_errors_of_images_and_offset": large_with,
-                "small_errors_of_images": small,
-                "small_errors_of_images_and_offset": small_with,
-            },
-            "attitude_clock_s": self.compared.clock_s,
-            "attitude_clock_sigma_s": self.compared.clock_sigma_s,
-            "a_priori_sigma": {
-                "line_time_s": self.sigmas.line_time_s,
-                "rotation_rad": self.sigmas.rotation_rad,
-                "attitude_clock_s": self.sigmas.clock_s,
-            },
-            "pairs": pairs.collect::<Vec<_>>(),
-            "not_used": without.collect::<Vec<_>>(),
-            "areograph": env!("CARGO_PKG_VERSION"),
-        })
-    }
+/// The answer for scripts.
+#[must_use]
+pub fn readings_answer(readings: &Readings) -> Value {
+    let Readings {
+        pairs,
+        not_used,
+        sigmas,
+        compared,
+    } = readings;
+    let pairs = pairs.iter().zip(&compared.left_m);
+    let pairs = pairs.map(|(pair, left_m)| {
+        let mut of_pair = json!(pair.disagreement.along_track);
+        of_pair["site"] = json!(pair.site);
+        of_pair["images"] = json!(pair.disagreement.images);
+        of_pair["left_by_clock_m"] = json!(left_m);
+        of_pair
+    });
+    let not_used = not_used.iter();
+    let not_used = not_used.map(|(what, reason)| json!({"what": what, "reason": reason}));
+    let [large, large_with, small, small_with] = compared.log_likelihoods;
+    json!({
+        "supported": readings_decision(readings).word(),
+        "log_odds_of_clock": compared.log_odds_of_clock(),
+        "log_odds_of_images": compared.log_odds_of_images(),
+        "decisive_log_odds": DECISIVE_ODDS.ln(),
+        "log_likelihoods": {
+            "large_errors_of_images": large,
+            "large_errors_of_images_and_offset": large_with,
+            "small_errors_of_images": small,
+            "small_errors_of_images_and_offset": small_with,
+        },
+        "attitude_clock_s": compared.clock_s,
+        "attitude_clock_sigma_s": compared.clock_sigma_s,
+        "a_priori_sigma": {
+            "line_time_s": sigmas.line_time_s,
+            "rotation_rad": sigmas.rotation_rad,
+            "attitude_clock_s": sigmas.clock_s,
+        },
+        "pairs": pairs.collect::<Vec<_>>(),
+        "not_used": not_used.collect::<Vec<_>>(),
+        "areograph": env!("CARGO_PKG_VERSION"),
+    })
 }
 
 /// Compares the causes over the pairs of the sites whose products are in `folders`, each of one site or of several, with the
 /// orientation from the kernels.
 ///
 /// # Errors
-/// Products that are missing, damaged or of a different version; no pair of images.
+/// Products that are missing, damaged or of a different version; no pair of images; images of several spacecraft.
 pub fn compare_readings(folders: &[PathBuf], sigmas: ReadingSigmas) -> Result<Readings> {
     let mut of_sites = Vec::new();
     for folder in folders {
@@ -142,32 +119,36 @@ pub fn compare_readings(folders: &[PathBuf], sigmas: ReadingSigmas) -> Result<Re
             of_sites.extend(sites(folder)?.into_values());
         }
     }
-    let (mut pairs, mut without) = (Vec::new(), Vec::new());
-    let mut seen = BTreeSet::new();
+    let (mut pairs, mut not_used) = (Vec::new(), Vec::new());
+    let (mut seen, mut spacecraft) = (BTreeSet::new(), BTreeSet::new());
     for folder in &of_sites {
-        let (site, of_site) = pairs_of(folder)?;
-        if of_site.is_empty() {
-            without.push((
-                site.clone(),
-                "no two images with common tie points".to_owned(),
-            ));
+        let of_site = SitePairs::of(folder)?;
+        let site = of_site.site;
+        if of_site.pairs.is_empty() {
+            not_used.push((site.clone(), "no two images with common tie points"));
+        } else {
+            spacecraft.extend(of_site.spacecraft);
         }
-        for (images, disagreement) in of_site {
-            let named = format!("{site}, {}", images.join(" and "));
-            let Some(disagreement) = disagreement else {
-                let reason = "not flown in one direction, or not apart across the track";
-                without.push((named, reason.to_owned()));
-                continue;
-            };
+        for (images, along_track) in of_site.pairs {
             // The same images in two sites are one observation.
-            let mut both = images;
+            let mut both = images.clone();
             both.sort_unstable();
-            if seen.insert(both) {
-                let site = site.clone();
-                pairs.push(ReadPair { site, disagreement });
-            } else {
-                without.push((named, "in an earlier site as well".to_owned()));
-            }
+            let is_new = seen.insert(both);
+            let reason = match along_track {
+                Some(along_track) if is_new => {
+                    pairs.push(ReadPair {
+                        site: site.clone(),
+                        disagreement: PairDisagreement {
+                            images,
+                            along_track,
+                        },
+                    });
+                    continue;
+                }
+                Some(_) => "in an earlier site as well",
+                None => "not flown in one direction, or not apart across the track",
+            };
+            not_used.push((format!("{site}, {}", images.join(" and ")), reason));
         }
     }
     if pairs.is_empty() {
@@ -177,35 +158,46 @@ pub fn compare_readings(folders: &[PathBuf], sigmas: ReadingSigmas) -> Result<Re
         };
         return Err(ReadingsError::NoPairs(sites).into());
     }
+    if spacecraft.len() > 1 {
+        let names: Vec<String> = spacecraft.into_iter().collect();
+        return Err(ReadingsError::SeveralSpacecraft(names.join(", ")).into());
+    }
     let disagreements: Vec<_> = pairs.iter().map(|pair| pair.disagreement.clone()).collect();
     let compared = compare(&disagreements, &sigmas).ok_or(ReadingsError::NotANumber)?;
     Ok(Readings {
         pairs,
-        without,
+        not_used,
         sigmas,
         compared,
     })
 }
 
-/// Identifiers of the images of a pair, and their disagreement where it shows a cause.
-type SitePair = ([String; 2], Option<PairDisagreement>);
+/// The pairs of a site.
+struct SitePairs {
+    site: String,
+    /// Names of the spacecraft of its images.
+    spacecraft: Vec<String>,
+    /// Identifiers of the images, and their displacement where it shows a cause.
+    pairs: Vec<([String; 2], Option<AlongTrack>)>,
+}
 
-/// The site of the products in `folder`, and its pairs.
-fn pairs_of(folder: &Path) -> Result<(String, Vec<SitePair>)> {
-    let manifest = read_published_by_this_version(folder, |_| false)?;
-    let data = PageData::without_tables(folder)?;
-    still_published(folder, &manifest)?;
-    let pairs = data.with(declarations(), |products| {
-        let geometric = products.geometric.iter();
-        let pairs = geometric.flat_map(|geometric| geometric.pairs);
-        let pairs = pairs.map(|pair| {
-            let along = pair.along_track.as_ref();
-            (
-                pair.images.clone(),
-                along.map(|along| along.disagreement(pair.images.clone())),
-            )
-        });
-        Ok(pairs.collect())
-    })?;
-    Ok((manifest.site, pairs))
+impl SitePairs {
+    /// The pairs of the site whose products are in `folder`.
+    fn of(folder: &Path) -> Result<Self> {
+        let manifest = read_published_by_this_version(folder, |_| false)?;
+        let data = PageData::without_tables(folder)?;
+        still_published(folder, &manifest)?;
+        data.with(declarations(), |products| {
+            let geometric = products.geometric.iter();
+            let pairs = geometric.flat_map(|geometric| geometric.pairs);
+            let images = products.images.iter();
+            Ok(Self {
+                site: manifest.site.clone(),
+                spacecraft: images.map(|image| image.times.spacecraft_name()).collect(),
+                pairs: pairs
+                    .map(|pair| (pair.images.clone(), pair.along_track))
+                    .collect(),
+            })
+        })
+    }
 }

@@ -113,7 +113,29 @@ fn a_real_pair_of_the_moon_goes_from_its_site_file_to_adjusted_products() {
     places_are_those_of_the_tests(&case, &out);
     heights_follow_lola(&out, &shots);
     products_are_of_the_moon(&out);
+    disagreements_are_of_one_spacecraft(&case);
     assert_eq!(case.stages_run(), [""; 0]);
+}
+
+/// Each spacecraft has a clock of its own.
+fn disagreements_are_of_one_spacecraft(case: &Case) {
+    let compare = |folders: &[&Path]| {
+        let mut command = case.areograph();
+        command.arg("compare-readings").args(folders);
+        case.outcome(command)
+    };
+    let lunar = Path::new("out");
+    let alone = compare(&[lunar]);
+    assert!(
+        alone.contains("One pair of images does not decide"),
+        "{alone}"
+    );
+    let mars = common::mission::site_run("isidis");
+    let both = compare(&[lunar, &mars]);
+    assert!(
+        both.starts_with("exit 2") && both.contains("the images are of several spacecraft: LUNAR RECONNAISSANCE ORBITER, MARS GLOBAL SURVEYOR"),
+        "{both}"
+    );
 }
 
 /// `real_ranges.rs`: the table's own spacecraft, and that of the support data.

@@ -86,8 +86,8 @@ declare_table! {
         /// Whether the along-track disagreement between the images of a pair is attributed to one time offset of the
         /// attitudes of all images. This offset rotates nadir-following images, but not inertially held images.
         /// Otherwise, all images are equally likely to be in error. Tie points of one pair cannot distinguish the two
-        /// causes: this key is a decision, not an estimate; see `readings`. Where the images of a pair disagree by more than 100 m, the report and
-        /// adjustment.json give both results.
+        /// causes: this key is a decision, not an estimate; see `readings`. Where the images of a pair disagree by
+        /// more than 100 m, the report and adjustment.json give both results.
         attitude_clock: bool = key(yes_or_no(
             "all images are equally likely to be in error",
             "nadir-following images are in error, by one offset",

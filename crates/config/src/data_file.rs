@@ -8,7 +8,8 @@ use toml::{
 };
 
 use super::{
-    declare::suggestion,
+    declare::{Found, suggestion},
+    document,
     problems::{Problems, Review},
 };
 
@@ -47,6 +48,25 @@ pub(super) fn read<T>(
         value
     });
     review.finish(value).map(|(value, _)| value)
+}
+
+/// The content of the file `path`, which the key `found` names, through `read`; `None` after problems were reported.
+pub(super) fn named<T>(
+    path: &Path,
+    found: &Found<'_>,
+    review: &mut Review<'_>,
+    read: impl FnOnce(&str, &Path) -> Result<T, Problems>,
+) -> Option<T> {
+    if !review.admit(path, found.value.span(), &found.key) {
+        return None;
+    }
+    let text = document::read(path).map_err(|failure| failure.cause.to_string());
+    let read = text.and_then(|text| read(&text, path).map_err(|all| all.to_string()));
+    read.map_err(|problems| {
+        let text = format!("{} names a file with problems:\n{problems}", found.key);
+        review.problem(Some(found.value.span()), text);
+    })
+    .ok()
 }
 
 impl<'i> DataTable<'i> {

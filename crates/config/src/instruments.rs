@@ -148,16 +148,7 @@ impl<T: Clone> Form for DataFile<T> {
             found.refuse(review, expected);
             return None;
         }
-        if !review.admit(&path, found.value.span(), &found.key) {
-            return None;
-        }
-        let read = super::read(&path).map_err(|failure| failure.cause.to_string());
-        let read = read.and_then(|text| (self.read)(&text, &path).map_err(|all| all.to_string()));
-        read.map_err(|problems| {
-            let text = format!("{} names a file with problems:\n{problems}", found.key);
-            review.problem(Some(found.value.span()), text);
-        })
-        .ok()
+        data_file::named(&path, found, review, self.read)
     }
 
     fn written(&self, value: &T) -> Value {

@@ -8,7 +8,6 @@ use toml::Value;
 use super::{
     data_file,
     declare::{Form, Found, ValueKind},
-    document,
     problems::{Problems, Review},
 };
 use areograph_geom::readings::{Cause, DECISIVE_ODDS};
@@ -120,17 +119,7 @@ impl Form for DecisionFile {
             );
             return None;
         };
-        if !review.admit(&path, found.value.span(), &found.key) {
-            return None;
-        }
-        let text = document::read(&path).map_err(|failure| failure.cause.to_string());
-        let read = text
-            .and_then(|text| ReadingsDecision::parse(&text, &path).map_err(|all| all.to_string()));
-        read.map_err(|problems| {
-            let text = format!("{} names a file with problems:\n{problems}", found.key);
-            review.problem(Some(found.value.span()), text);
-        })
-        .ok()
+        data_file::named(&path, found, review, ReadingsDecision::parse)
     }
 
     fn written(&self, _value: &ReadingsDecision) -> Value {

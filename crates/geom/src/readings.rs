@@ -14,13 +14,18 @@
 use std::collections::BTreeMap;
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+#[cfg(feature = "schema")]
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Odds that decide between two readings that are equally likely a priori: 150 to 1 is very strong evidence (Kass and Raftery
-/// 1995, section 3.2). A wrong reading displaces products by 100 m.
+#[cfg(feature = "schema")]
+use areograph_base::schema::all_positive;
+
+/// Odds that decide between hypotheses that are equally likely a priori: 150 to 1 is very strong evidence (Kass and Raftery
+/// 1995, section 3.2). A wrong decision displaces products by 100 m.
 pub const DECISIVE_ODDS: f64 = 150.0;
-/// Standard deviation of the displacement by errors that the tie points of a pair share, metres: jitter, and sensitivities of
-/// the middle of the images.
+/// Standard deviation of a displacement by errors that the tie points of a pair share, metres: jitter, and sensitivities that
+/// are those of one tie point. Without it, the three pairs of three images would contradict each other.
 const SHARED_M: f64 = 10.0;
 /// Factors of the assumed sizes of line-time and rotation errors, equally likely a priori.
 const FACTORS: [f64; 3] = [
@@ -29,21 +34,32 @@ const FACTORS: [f64; 3] = [
     std::f64::consts::SQRT_2,
 ];
 
+/// Displacement of the ground along the track, first minus second image of a pair, and its dependence on errors of both.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
+pub struct AlongTrack {
+    /// Measured displacement, metres: the mean over the tie points.
+    pub apart_m: f64,
+    /// Its standard deviation from the scatter of the tie points, metres.
+    #[cfg_attr(feature = "schema", schemars(range(min = 0.0)))]
+    pub sigma_m: f64,
+    /// Distance of the ground from each camera, metres: displacement per radian of a rotation about the axis across the track.
+    #[cfg_attr(feature = "schema", schemars(transform = all_positive))]
+    pub range_m: [f64; 2],
+    /// Displacement by a delay of the lines of each image, metres per second.
+    #[cfg_attr(feature = "schema", schemars(transform = all_positive))]
+    pub line_time_m_s: [f64; 2],
+    /// Displacement by an offset of the attitude clock of both images, metres per second.
+    pub clock_m_s: f64,
+}
+
 /// The disagreement of a pair of images along the track.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PairDisagreement {
     /// Identifiers of the images: errors of an image are common to its pairs.
     pub images: [String; 2],
-    /// Displacement of the ground in the first image minus displacement in the second, metres.
-    pub apart_m: f64,
-    /// Standard deviation of this by the measurements of tie points, metres.
-    pub sigma_m: f64,
-    /// Displacement in each image by a rotation about the axis across the track, metres per radian: its range.
-    pub range_m: [f64; 2],
-    /// Displacement in each image by a delay of its lines, metres per second.
-    pub line_time_m_s: [f64; 2],
-    /// Change of `apart_m` with the offset of the attitude clock, metres per second.
-    pub clock_m_s: f64,
+    /// The displacement.
+    pub along_track: AlongTrack,
 }
 
 /// A priori standard deviations.
@@ -97,13 +113,21 @@ impl CausesCompared {
         large - small.max(small_with)
     }
 
+    /// Whether an offset with large errors of single images is more probable than either cause alone.
+    #[must_use]
+    pub fn are_both(&self) -> bool {
+        let [large, both, _, small_with] = self.log_likelihoods;
+        both > large.max(small_with)
+    }
+
     /// The cause that has decisive odds; `None` where neither has, or where both together are more probable.
     #[must_use]
     pub fn supported(&self) -> Option<Cause> {
-        let [large, both, _, small_with] = self.log_likelihoods;
-        if self.log_odds_of_clock() >= DECISIVE_ODDS.ln() && small_with >= both {
+        if self.are_both() {
+            None
+        } else if self.log_odds_of_clock() >= DECISIVE_ODDS.ln() {
             Some(Cause::AttitudeClock)
-        } else if self.log_odds_of_images() >= DECISIVE_ODDS.ln() && large >= both {
+        } else if self.log_odds_of_images() >= DECISIVE_ODDS.ln() {
             Some(Cause::SingleImages)
         } else {
             None
@@ -120,16 +144,15 @@ pub fn compare(pairs: &[PairDisagreement], sigmas: &ReadingSigmas) -> Option<Cau
     if pairs.is_empty() {
         return None;
     }
-    let apart_m = DVector::from_iterator(pairs.len(), pairs.iter().map(|pair| pair.apart_m));
-    let by_clock_m_s = DVector::from_iterator(pairs.len(), pairs.iter().map(|pair| pair.clock_m_s));
+    let of_pairs = |of: fn(&AlongTrack) -> f64| {
+        DVector::from_iterator(pairs.len(), pairs.iter().map(|pair| of(&pair.along_track)))
+    };
+    let apart_m = of_pairs(|pair| pair.apart_m);
+    let by_clock_m_s = of_pairs(|pair| pair.clock_m_s);
     let by_rotation = shared(pairs, |pair| pair.range_m);
     let by_line_time = shared(pairs, |pair| pair.line_time_m_s);
-    let measured_m2 = DMatrix::from_diagonal(&DVector::from_iterator(
-        pairs.len(),
-        pairs
-            .iter()
-            .map(|pair| pair.sigma_m.powi(2) + SHARED_M.powi(2)),
-    ));
+    let measured_m2 =
+        DMatrix::from_diagonal(&of_pairs(|pair| pair.sigma_m.powi(2) + SHARED_M.powi(2)));
     let (mut large, mut large_with) = (Vec::new(), Vec::new());
     let (mut small, mut clocks) = (Vec::new(), Vec::new());
     for rotations in FACTORS {
@@ -198,10 +221,7 @@ impl Clock {
 }
 
 /// Covariances of the disagreements by errors of single images of size 1, which have these effects.
-fn shared(
-    pairs: &[PairDisagreement],
-    effects: impl Fn(&PairDisagreement) -> [f64; 2],
-) -> DMatrix<f64> {
+fn shared(pairs: &[PairDisagreement], effects: impl Fn(&AlongTrack) -> [f64; 2]) -> DMatrix<f64> {
     let mut column_of: BTreeMap<&str, usize> = BTreeMap::new();
     for image in pairs.iter().flat_map(|pair| &pair.images) {
         let next = column_of.len();
@@ -209,7 +229,12 @@ fn shared(
     }
     let mut design = DMatrix::<f64>::zeros(pairs.len(), column_of.len());
     for (row, pair) in pairs.iter().enumerate() {
-        for ((image, effect), sign) in pair.images.iter().zip(effects(pair)).zip([1.0, -1.0]) {
+        for ((image, effect), sign) in pair
+            .images
+            .iter()
+            .zip(effects(&pair.along_track))
+            .zip([1.0, -1.0])
+        {
             design[(row, column_of[image.as_str()])] += sign * effect;
         }
     }
@@ -235,205 +260,4 @@ fn log_mean(logarithms: &[f64]) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::random::Random;
-
-    const SIGMAS: ReadingSigmas = ReadingSigmas {
-        line_time_s: 0.045,
-        rotation_rad: 1e-4,
-        clock_s: 1.0,
-    };
-
-    fn pair(number: usize, apart_m: f64) -> PairDisagreement {
-        PairDisagreement {
-            images: [format!("nadir {number}"), format!("held {number}")],
-            apart_m,
-            sigma_m: 1.0,
-            range_m: [380e3, 420e3],
-            line_time_m_s: [3_000.0; 2],
-            clock_m_s: 330.0,
-        }
-    }
-
-    /// The closed form for one pair: two variances of one difference.
-    #[test]
-    fn one_pair_has_the_ratio_of_two_normal_densities() {
-        let found = compare(&[pair(0, 200.0)], &SIGMAS).unwrap();
-        let of = |rotation: f64, clock_s: f64| {
-            let turned_m2 = (380e3_f64.powi(2) + 420e3_f64.powi(2)) * (rotation * 1e-4).powi(2);
-            let variance_m2: f64 = 1.0 + SHARED_M.powi(2) + turned_m2 + (330.0 * clock_s).powi(2);
-            (-0.5 * 200_f64.powi(2) / variance_m2).exp() / variance_m2.sqrt()
-        };
-        let sum = |clock_s: f64| {
-            FACTORS
-                .iter()
-                .map(|factor| of(*factor, clock_s))
-                .sum::<f64>()
-        };
-        let expected = (sum(1.0) / sum(0.0)).ln();
-        let [_, _, small, small_with] = found.log_likelihoods;
-        // Rounding of logarithms of about 10.
-        assert!(
-            (small_with - small - expected).abs() < 1e-9,
-            "{found:?} {expected}"
-        );
-    }
-
-    #[test]
-    fn the_three_pairs_of_the_paper_do_not_decide() {
-        // Shan et al. 2005, Table 5: 231, 225 and 271 m.
-        let pairs = [231.0, 225.0, 271.0].iter().enumerate();
-        let pairs: Vec<_> = pairs
-            .map(|(number, apart_m)| pair(number, *apart_m))
-            .collect();
-        let found = compare(&pairs, &SIGMAS).unwrap();
-        assert!((0.65..0.8).contains(&found.clock_s), "{found:?}");
-        assert!(
-            found.supported().is_none() && found.log_odds_of_clock() > 0.0,
-            "{found:?}"
-        );
-    }
-
-    /// A mission with errors of these sizes.
-    struct Mission {
-        offset_sigma_s: f64,
-        rotation_rad: f64,
-        line_time_s: f64,
-    }
-
-    impl Mission {
-        /// Decisions for either cause, by ten pairs of each of 200 missions, and the ratio of the errors of the offset to their
-        /// stated standard deviations.
-        fn decided(&self, random: &mut Random) -> ([usize; 2], f64) {
-            let (mut decided, mut squares) = ([0_usize; 2], 0.0_f64);
-            for mission in 0..MISSIONS {
-                let clock_s = self.offset_sigma_s * random.normal();
-                let pairs = (0..10).map(|number| {
-                    let mut pair = pair(10 * mission + number, 330.0 * clock_s);
-                    for (range_m, sign) in pair.range_m.iter().zip([1.0, -1.0]) {
-                        let of_rotation_m = range_m * self.rotation_rad * random.normal();
-                        let of_lines_m = 3_000.0 * self.line_time_s * random.normal();
-                        pair.apart_m += sign * (of_rotation_m + of_lines_m);
-                    }
-                    pair
-                });
-                let found = compare(&pairs.collect::<Vec<_>>(), &SIGMAS).unwrap();
-                match found.supported() {
-                    Some(Cause::SingleImages) => decided[0] += 1,
-                    Some(Cause::AttitudeClock) => decided[1] += 1,
-                    None => {}
-                }
-                squares += ((found.clock_s - clock_s) / found.clock_sigma_s).powi(2);
-            }
-            (decided, (squares / MISSIONS as f64).sqrt())
-        }
-    }
-
-    const MISSIONS: usize = 200;
-
-    #[test]
-    fn ten_pairs_decide_for_the_cause_that_made_them() {
-        let mut random = Random::new(7, "readings");
-        let lines = Mission {
-            offset_sigma_s: 0.0,
-            rotation_rad: 1e-4,
-            line_time_s: 0.044,
-        };
-        let ([images, clock], _) = lines.decided(&mut random);
-        // Odds of 150 to 1 leave at most one wrong decision of 151.
-        assert!(
-            images >= MISSIONS * 3 / 4 && clock <= MISSIONS / 151,
-            "{images} {clock}"
-        );
-        // Attitudes of 0.4 mrad are errors of single images as well.
-        let attitudes = Mission {
-            offset_sigma_s: 0.0,
-            rotation_rad: 4e-4,
-            line_time_s: 0.0,
-        };
-        let ([images, clock], _) = attitudes.decided(&mut random);
-        assert!(
-            images >= MISSIONS * 3 / 4 && clock <= MISSIONS / 151,
-            "{images} {clock}"
-        );
-        let offset = Mission {
-            offset_sigma_s: 0.73,
-            rotation_rad: 1e-4,
-            line_time_s: 0.0,
-        };
-        let ([images, clock], ratio) = offset.decided(&mut random);
-        // Of six offsets, one is below 0.15 s, and hardly distinct from none.
-        assert!(
-            clock >= MISSIONS * 7 / 10 && images <= MISSIONS / 151,
-            "{images} {clock}"
-        );
-        assert!((0.8..1.25).contains(&ratio), "{ratio}");
-    }
-
-    #[test]
-    fn images_that_agree_and_causes_that_occur_together_are_undecided() {
-        let mut random = Random::new(8, "readings");
-        for (rotation_rad, line_time_s) in [(1e-4, 0.0), (5e-5, 0.0), (5e-5, 0.005), (5e-5, 0.01)] {
-            let agree = Mission {
-                offset_sigma_s: 0.0,
-                rotation_rad,
-                line_time_s,
-            };
-            let (decided, _) = agree.decided(&mut random);
-            assert!(
-                decided.iter().all(|of| *of <= MISSIONS / 100),
-                "{rotation_rad} {line_time_s}: {decided:?}"
-            );
-        }
-        let together = Mission {
-            offset_sigma_s: 0.73,
-            rotation_rad: 1e-4,
-            line_time_s: 0.044,
-        };
-        let ([_, clock], _) = together.decided(&mut random);
-        // The offset would be stated with too small a standard deviation.
-        assert!(clock <= MISSIONS / 20, "{clock}");
-    }
-
-    #[test]
-    fn pairs_of_one_image_share_its_error() {
-        // One image with an error in three pairs is one error, not three.
-        let with_one = |image: &str| {
-            let pairs = (0..3).map(|number| {
-                let mut pair = pair(number, 150.0);
-                pair.images[0] = format!("{image}{}", if image == "own" { number } else { 0 });
-                pair
-            });
-            compare(&pairs.collect::<Vec<_>>(), &SIGMAS)
-                .unwrap()
-                .log_odds_of_clock()
-        };
-        assert!(with_one("shared") < with_one("own"));
-    }
-
-    /// Three images of one place: their three disagreements close up to metres.
-    #[test]
-    fn a_triangle_is_two_pairs() {
-        let of = |apart_m: [f64; 3]| {
-            let mut pairs: Vec<_> = apart_m
-                .iter()
-                .enumerate()
-                .map(|(number, apart_m)| pair(number, *apart_m))
-                .collect();
-            for (pair, images) in pairs.iter_mut().zip([["a", "b"], ["b", "c"], ["a", "c"]]) {
-                pair.images = images.map(str::to_owned);
-                pair.range_m = [400e3; 2];
-            }
-            pairs[1].clock_m_s = 0.0;
-            pairs[2].clock_m_s = 335.0;
-            compare(&pairs, &SIGMAS).unwrap().log_odds_of_clock()
-        };
-        // Five metres of closure change the odds by less than a factor of two.
-        let [closed, open] = [[200.0, 30.0, 230.0], [200.0, 30.0, 235.0]].map(of);
-        assert!(
-            (closed - open).abs() < 2_f64.ln() && closed < DECISIVE_ODDS.ln(),
-            "{closed} {open}"
-        );
-    }
-}
+mod tests;

@@ -21,13 +21,14 @@ use areograph_geom::{
     bundle::ORIENTATION_UNKNOWNS,
     light_time::LightTime,
     pushbroom::CameraModel,
+    readings::AlongTrack,
     statistics::Summary,
     uncertainty::{ResidualMoments, UncertaintyBudget},
 };
 use areograph_stages::{
     adjust::{AdjustmentSummary, CorrectedImage, HeightSummary, PointKind, ReliefSummary},
     check_heights::{HeightCheck, ProfilesApart, SurfaceFigures},
-    compare_pairs::{AlongTrack, PairComparison, ProfileByTies},
+    compare_pairs::{PairComparison, ProfileByTies},
     intersect::{ImageResiduals, IntersectedTies},
 };
 use boresight::BoresightDocument;

@@ -81,7 +81,7 @@ pub use html::STYLE;
 pub use laser_match::match_page;
 pub use net::net_page;
 pub use overlays::overlays_page;
-pub use readings::{ReadPair, ReadingsReport, readings_page};
+pub use readings::{ReadPair, Readings, readings_page};
 pub use section::Section;
 pub use sites::{Earlier, SiteLine, SiteSummary, sites_page};
 pub use summary::{DOWNLOADS, UNADJUSTED};

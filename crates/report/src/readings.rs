@@ -22,20 +22,20 @@ pub struct ReadPair {
     pub disagreement: PairDisagreement,
 }
 
-/// Contents of the page.
-#[derive(Debug, Clone, Copy)]
-pub struct ReadingsReport<'a> {
-    /// The pairs.
-    pub pairs: &'a [ReadPair],
+/// Causes of the along-track disagreement, compared over the pairs of some sites.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Readings {
+    /// The pairs, in the order of their sites, each once.
+    pub pairs: Vec<ReadPair>,
     /// Pairs and sites that are not used, each with the reason.
-    pub without: &'a [(String, String)],
+    pub not_used: Vec<(String, &'static str)>,
     /// A priori standard deviations.
-    pub sigmas: &'a ReadingSigmas,
+    pub sigmas: ReadingSigmas,
     /// The result.
-    pub compared: &'a CausesCompared,
+    pub compared: CausesCompared,
 }
 
-impl ReadingsReport<'_> {
+impl Readings {
     /// The result in one sentence.
     #[must_use]
     pub fn headline(&self) -> String {
@@ -48,7 +48,7 @@ impl ReadingsReport<'_> {
                 format!("{of}: one offset of the attitude clock, {}.", self.clock())
             }
             Some(Cause::SingleImages) => format!(
-                "{of}: independent errors of single images, not one offset of the attitude clock."
+                "{of}: independent errors of single images; one offset of the attitude clock does not explain them."
             ),
             None => format!(
                 "{of} {decides} between errors of single images and one offset of the attitude clock."
@@ -56,21 +56,17 @@ impl ReadingsReport<'_> {
         }
     }
 
-    /// The odds of the causes, one sentence each.
+    /// The odds of the causes, and what a decision requires, one sentence each.
     #[must_use]
-    pub fn odds(&self) -> [String; 2] {
+    pub fn odds(&self) -> Vec<String> {
         let of = |cause: &str, log_odds: f64, others: &str| {
-            let (times, comparison) = if log_odds >= 0.0 {
-                (log_odds, "more")
-            } else {
-                (-log_odds, "less")
-            };
+            let comparison = if log_odds >= 0.0 { "more" } else { "less" };
             format!(
-                "{cause} is {} times {comparison} probable than {others}.",
-                odds(times)
+                "{cause} is {comparison} probable than {others}, by a factor of {}.",
+                odds(log_odds.abs())
             )
         };
-        [
+        let mut sentences = vec![
             of(
                 "One offset of the attitude clock",
                 self.compared.log_odds_of_clock(),
@@ -80,10 +76,15 @@ impl ReadingsReport<'_> {
                 "The hypothesis of large errors of single images",
                 self.compared.log_odds_of_images(),
                 "that of small ones, with or without an offset",
-            ) + &format!(
-                " A decision requires odds of {DECISIVE_ODDS} to 1, and that both causes together are less probable."
             ),
-        ]
+        ];
+        if self.compared.are_both() {
+            sentences.push("Both causes together are more probable than either alone.".to_owned());
+        }
+        sentences.push(format!(
+            "A decision requires odds of {DECISIVE_ODDS} to 1, and that both causes together are less probable."
+        ));
+        sentences
     }
 
     fn clock(&self) -> String {
@@ -92,7 +93,7 @@ impl ReadingsReport<'_> {
             clock_sigma_s,
             ..
         } = self.compared;
-        format!("{} ± {} s", signed(*clock_s, 2), label(*clock_sigma_s, 2))
+        format!("{} ± {} s", signed(clock_s, 2), label(clock_sigma_s, 2))
     }
 }
 
@@ -109,37 +110,36 @@ fn odds(logarithm: f64) -> String {
     }
 }
 
-/// Two readings, compared, as one HTML page.
+/// A comparison of causes as one HTML page.
 ///
 /// # Errors
 /// A plot that cannot be drawn, which is a bug in areograph.
-pub fn readings_page(report: &ReadingsReport) -> Result<String> {
-    let tone = match report.compared.supported() {
+pub fn readings_page(readings: &Readings) -> Result<String> {
+    let tone = match readings.compared.supported() {
         Some(_) => Tone::Good,
         None => Tone::Remarks,
     };
-    let sigmas = report.sigmas;
+    let sigmas = &readings.sigmas;
     let words = format!(
         "A priori standard deviations: large errors of single images as line times of {} ms, small ones as rotations of {}\u{2033}, \
          both within a factor of √2; clock offset {} s. Offset of the attitude clock, if it is the cause: {}.",
         label(sigmas.line_time_s / SECONDS_PER_MS, 1),
         label(sigmas.rotation_rad / RADIANS_PER_ARCSECOND, 1),
         label(sigmas.clock_s, 2),
-        report.clock(),
+        readings.clock(),
     );
-    let without: Vec<String> = report
-        .without
-        .iter()
-        .map(|(site, reason)| format!("{site}: {reason}"))
+    let not_used = readings.not_used.iter();
+    let not_used: Vec<String> = not_used
+        .map(|(what, reason)| format!("Not used: {what}: {reason}."))
         .collect();
-    let odds = report.odds().join(" ");
-    let body = html! { p { (odds) " " (words) } (list(&without)) };
-    let lead = verdict(tone, &report.headline(), &body);
-    let sections = [Section::new("Pairs", pairs(report)?)];
+    let odds = readings.odds().join(" ");
+    let body = html! { p { (odds) " " (words) } (list(&not_used)) };
+    let lead = verdict(tone, &readings.headline(), &body);
+    let sections = [Section::new("Pairs", pairs(readings)?)];
     Ok(page("Cause of along-track disagreements", &lead, &sections))
 }
 
-fn pairs(report: &ReadingsReport) -> Result<Markup> {
+fn pairs(readings: &Readings) -> Result<Markup> {
     let columns = &[
         Column::Text("site"),
         Column::Text("images"),
@@ -152,12 +152,12 @@ fn pairs(report: &ReadingsReport) -> Result<Markup> {
         "Displacement along the track, first minus second image",
         columns,
     );
-    let pairs = report.pairs.iter().zip(&report.compared.left_m);
+    let pairs = readings.pairs.iter().zip(&readings.compared.left_m);
     for (pair, left_m) in pairs {
-        let of = &pair.disagreement;
+        let (images, of) = (&pair.disagreement.images, &pair.disagreement.along_track);
         let cells: Vec<Cell> = vec![
             pair.site.as_str().into(),
-            of.images.join(", ").into(),
+            images.join(", ").into(),
             signed(of.apart_m, 1).into(),
             label(of.sigma_m, 1).into(),
             signed(of.clock_m_s, 0).into(),
@@ -165,14 +165,17 @@ fn pairs(report: &ReadingsReport) -> Result<Markup> {
         ];
         table.row(true, cells);
     }
-    let dots = report.pairs.iter();
-    let dots = dots.map(|pair| (pair.disagreement.clock_m_s, pair.disagreement.apart_m));
+    let dots = readings.pairs.iter();
+    let dots = dots.map(|pair| {
+        let of = &pair.disagreement.along_track;
+        (of.clock_m_s, of.apart_m)
+    });
     let dots: Vec<(f64, f64)> = dots.collect();
     let ends = dots.iter().map(|dot| dot.0);
     let (least, most) = ends.fold((0.0_f64, 0.0_f64), |(least, most), x| {
         (least.min(x), most.max(x))
     });
-    let expected = [least, most].map(|x| (x, x * report.compared.clock_s));
+    let expected = [least, most].map(|x| (x, x * readings.compared.clock_s));
     let panel = Panel::of(
         "apart, m",
         vec![

@@ -26,6 +26,7 @@ use areograph_geom::{
     misregistration::{ImageToImage, Pair},
     oriented_camera::OrientedCamera,
     pushbroom::ExteriorOrientation,
+    readings::AlongTrack,
     statistics::Summary,
     uncertainty::{PairResiduals, ResidualMoments, UncertaintyBudget, uncertainty_budget},
 };
@@ -34,8 +35,8 @@ use areograph_store::{
     stage_inputs,
 };
 
-pub use along_track::AlongTrack;
-use budget::{apart, budget_input, moments_of};
+use along_track::along_track;
+use budget::{apart, budget_input, mean, moments_of};
 pub use footprint_heights::FootprintHeight;
 use footprint_heights::footprint_heights;
 
@@ -276,18 +277,23 @@ impl<'a> Shared<'a> {
                 away_m.norm() / focal_length_px
             })
         });
+        let apart = apart(&self.points, line_spacing_m, pixel_size_m);
+        let apart_m =
+            residuals[0].mean_x * line_spacing_m[0] - residuals[1].mean_x * line_spacing_m[1];
+        let scatter_m = apart.deviation_x * mean(line_spacing_m);
+        let apart_sigma_m = scatter_m / (self.points.len() as f64).sqrt();
         let budget = budget_input(
             PairResiduals {
                 images: residuals,
-                apart: apart(&self.points, line_spacing_m, pixel_size_m),
+                apart,
             },
             footprints.as_ref(),
             line_spacing_m,
             height_over_base,
         );
-        let along_track = AlongTrack::of(&self.points, pair, body, line_spacing_m, pixel_size_m);
+        let middle = &self.points[self.points.len() / 2];
         PairComparison {
-            along_track,
+            along_track: along_track(pair, body, middle, line_spacing_m, [apart_m, apart_sigma_m]),
             images: pair.map(|image| image.id.clone()),
             ties: u32::try_from(self.points.len()).unwrap_or(u32::MAX),
             convergence_rad: self.each(|point, _| point.convergence_rad),
@@ -295,9 +301,7 @@ impl<'a> Shared<'a> {
             line_spacing_m,
             pixel_size_m,
             residuals,
-            along_track_parallax_m: (residuals[0].mean_x * line_spacing_m[0]
-                - residuals[1].mean_x * line_spacing_m[1])
-                .abs(),
+            along_track_parallax_m: apart_m.abs(),
             footprints,
             mola_spacing_m,
             budget: uncertainty_budget(&budget).map_err(|error| error.to_string()),

@@ -103,6 +103,16 @@ impl ImageTimes {
         }
     }
 
+    /// Name of its spacecraft in labels or support data, capitals, blanks for underscores.
+    #[must_use]
+    pub fn spacecraft_name(&self) -> String {
+        let name = match &self.support {
+            Some(support) => &support.platform,
+            None => &self.instrument.spacecraft.label_name,
+        };
+        name.to_uppercase().replace('_', " ")
+    }
+
     /// Viewing directions of the samples of a line.
     #[must_use]
     pub fn detector(&self) -> Detector {

@@ -63,6 +63,6 @@ fn misregistration(footprints: &FootprintsByTies, line_spacing_m: f64) -> Option
     })
 }
 
-fn mean([first, second]: [f64; 2]) -> f64 {
+pub(super) fn mean([first, second]: [f64; 2]) -> f64 {
     0.5 * (first + second)
 }
