@@ -3,12 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use serde_json::json;
 
 use super::{load_sites, output};
 use crate::{
     error::{Error, Kind},
-    flow::{Checked, check_out, check_site},
+    flow::{Checked, check_answer, check_out, check_site},
     store::hashes::HashCache,
 };
 
@@ -45,7 +44,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
         let out = check_out(&arguments.out, std::slice::from_ref(&site));
         checked.failures.splice(0..0, out.err());
         if arguments.json {
-            answers.push(answer(&site.site, &checked));
+            answers.push(check_answer(&site.site, &checked));
         } else {
             print(&site.site, &checked);
         }
@@ -80,15 +79,4 @@ fn print(site: &str, checked: &Checked) {
     for remark in &verdict.remarks {
         output::line(format_args!("  {remark}"));
     }
-}
-
-fn answer(site: &str, checked: &Checked) -> serde_json::Value {
-    let failures = checked.failures.iter().map(ToString::to_string);
-    json!({
-        "site": site,
-        "ready": checked.failures.is_empty(),
-        "findings": checked.findings,
-        "verdict": checked.verdict,
-        "failures": failures.collect::<Vec<_>>(),
-    })
 }

@@ -1,6 +1,5 @@
 //! `areograph fetch`.
 
-mod shots;
 mod show;
 mod wish;
 
@@ -8,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 
-use self::wish::Wanted;
+use self::wish::needs;
 use super::{stop::Signals, windows::edges};
 use crate::{
     config::window_of_box,
@@ -18,6 +17,7 @@ use crate::{
         audit::{audit, verify},
         plan::Plan,
     },
+    flow::Needs,
 };
 
 /// Fetches the files that a site needs from the archives of the mission.
@@ -118,7 +118,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
     if arguments.verify {
         return verified(&filling);
     }
-    let Wanted { wish, notes } = Wanted::of(arguments)?;
+    let Needs { wish, notes } = needs(arguments)?;
     let mut indexes = Filling::indexes_of(&wish);
     if arguments.index {
         // For `areograph init --place`, which looks for images.

@@ -43,21 +43,6 @@ struct Files {
     json: bool,
 }
 
-impl Files {
-    fn load(&self) -> Result<KernelSet, Error> {
-        match &self.files[..] {
-            [one]
-                if one
-                    .extension()
-                    .is_some_and(|e| e.eq_ignore_ascii_case("tm")) =>
-            {
-                KernelSet::from_metakernel(one)
-            }
-            files => KernelSet::from_files(files),
-        }
-    }
-}
-
 pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     match &arguments.command {
         Command::List(files) => list(files),
@@ -67,7 +52,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
 }
 
 fn list(files: &Files) -> Result<(), Error> {
-    let kernels = files.load()?;
+    let kernels = KernelSet::named(&files.files)?;
     if files.json {
         output::json(&json!({
             "kernels": kernels.kernels(),
@@ -91,7 +76,7 @@ fn list(files: &Files) -> Result<(), Error> {
 }
 
 fn coverage(files: &Files) -> Result<(), Error> {
-    let session = Session::open(&files.load()?)?;
+    let session = Session::open(&KernelSet::named(&files.files)?)?;
     let coverage = session.coverage()?;
     let others = Spacecraft::all().iter().filter(|one| !one.has_laser());
     let others: Vec<Session> = others.map(|one| session.of(one)).collect();

@@ -30,6 +30,7 @@ mod windows;
 mod worker;
 
 use std::{
+    ffi::OsString,
     path::{Path, PathBuf},
     process::ExitCode,
 };
@@ -112,7 +113,15 @@ enum Command {
 /// Parses the command line, runs the command, reports failures on standard error.
 #[must_use]
 pub fn main() -> ExitCode {
-    let cli = Cli::parse();
+    main_of(std::env::args_os())
+}
+
+/// As [`main`] with these arguments, of which the first is the name of the program.
+///
+/// A wrong command line ends the process.
+#[must_use]
+pub fn main_of(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> ExitCode {
+    let cli = Cli::parse_from(arguments);
     log(&cli);
     let code = run(cli.command);
     // A success with incomplete output is a failure.

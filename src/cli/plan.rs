@@ -7,13 +7,12 @@ use std::{
 };
 
 use clap::Args;
-use serde_json::json;
 
 use super::{load, load_sites, output};
 use crate::{
     config::{CalibrationConfig, NetConfig},
     error::Error,
-    flow::{PUBLISH, RunOptions, StageReason, Task, check_out, plan_task},
+    flow::{PUBLISH, RunOptions, Task, check_out, plan_answer, plan_task},
     store::hashes::HashCache,
 };
 
@@ -99,14 +98,13 @@ pub(super) fn print(
 ) -> Result<(), Error> {
     let mut answers = Vec::new();
     for task in tasks {
-        let stages = plan_task(*task, options)?.stages;
+        let plan = plan_task(*task, options)?;
         if as_json {
-            let stages: Vec<_> = stages.iter().map(stage_json).collect();
-            answers.push(json!({ task.kind(): task.name(), "stages": stages }));
+            answers.push(plan_answer(*task, &plan));
             continue;
         }
         output::line(format_args!("{}:", task.name()));
-        for planned in stages {
+        for planned in plan.stages {
             let word = if planned.reason.runs() {
                 "run "
             } else {
@@ -122,13 +120,4 @@ pub(super) fn print(
         output::json(&answers.into());
     }
     Ok(())
-}
-
-/// A stage with its reason, for the answers of plans and runs.
-pub(super) fn stage_json(stage: &StageReason) -> serde_json::Value {
-    json!({
-        "stage": stage.stage,
-        "runs": stage.reason.runs(),
-        "because": stage.reason.to_string(),
-    })
 }

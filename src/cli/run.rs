@@ -1,7 +1,7 @@
 //! `areograph run`.
 
 use std::{
-    path::{Path, PathBuf},
+    path::PathBuf,
     process::ExitCode,
     sync::{Arc, atomic::AtomicBool},
 };
@@ -24,10 +24,10 @@ use crate::{
     error::{Error, Kind},
     flow::{
         Ending, Observer, PUBLISH, RunOptions, RunOutcome, STAGES, Task, check_out, publish_sites,
-        run_site,
+        run_answer, run_site,
     },
     products::REPORT,
-    store::{hashes::HashCache, manifest::Manifest, publish::read_manifest},
+    store::hashes::HashCache,
 };
 
 /// Runs sites from kernels to validated products in `<out>/<site>`.
@@ -241,44 +241,12 @@ fn open_page(outcomes: &[Outcome], over_all: Option<&PathBuf>) {
 }
 
 fn outcome_json(outcome: &Outcome) -> serde_json::Value {
-    let products = |folder: &Path, published: bool, manifest: &Manifest| {
-        json!({
-            "published": published,
-            "page": folder.join("report/index.html"),
-            "verdict": manifest.verdict.word(),
-            "valid": manifest.verdict.valid,
-            "reasons": manifest.verdict.reasons,
-            "remarks": manifest.verdict.remarks,
-            "untested": manifest.verdict.untested,
-            "checks": manifest.verdict.checks,
-            "figures": manifest.figures,
-            "counts": manifest.counts,
-            "complaints": manifest.complaints.count,
-        })
-    };
     match outcome {
         Err(failure) => json!({
             "site": failure.site,
             "error": failure.to_string(),
             "exit_code": failure.kind().exit_code(),
         }),
-        Ok(RunOutcome {
-            name: site,
-            folder,
-            stages,
-            ending,
-            ..
-        }) => {
-            let ending = match ending {
-                Ending::Published(manifest) => products(folder, true, manifest),
-                Ending::Unchanged(manifest) => products(folder, false, manifest),
-                Ending::StoppedAfter(stage) => json!({
-                    "stopped_after": stage,
-                    "earlier_products_utc": read_manifest(folder).map(|earlier| earlier.finished_utc),
-                }),
-            };
-            let stages: Vec<_> = stages.iter().map(plan::stage_json).collect();
-            json!({ "site": site, "folder": folder, "stages": stages, "ending": ending })
-        }
+        Ok(outcome) => run_answer(outcome),
     }
 }

@@ -5,6 +5,7 @@
 //! keeps its output, a plan determines whether it would be kept, a check runs the stages that determine whether a run
 //! can succeed. Nets, calibrations, laser matches and archives are descriptions for the same drivers (`flow/task.rs`).
 
+mod answers;
 mod archive;
 mod bounds;
 mod calibration;
@@ -18,6 +19,7 @@ mod export;
 mod kernels;
 mod laser_match;
 mod manifest;
+mod needs;
 mod net;
 mod observer;
 mod out;
@@ -32,12 +34,15 @@ mod readings;
 mod registered;
 mod result;
 mod run;
+mod shot_search;
+mod shot_tables;
 mod site;
 mod sites;
 mod surface;
 mod task;
 mod triangulate;
 
+pub use answers::{check_answer, plan_answer, run_answer};
 pub use archive::{ArchiveRequest, archive_filter, archive_limits};
 pub use check::{Checked, check_site, required_by_site, rival_sets};
 pub use choice::{ChooseKernels, KernelChoice, RivalKernelSets};
@@ -47,12 +52,17 @@ pub use compare::{
 };
 pub use driver::StageReason;
 pub use export::{Exported, export_site};
+pub use needs::{Needs, shots_of_box};
 pub use observer::{Observer, StageEvent};
 pub use out::{OutError, check_out};
 pub use page::{PageAgain, page_again};
 pub use plan::{RunPlan, plan_site, plan_task};
 pub use readings::{compare_readings, readings_answer, readings_decision, usual_sigmas};
 pub use run::{Ending, RunOptions, RunOutcome, run_site, run_task};
+pub use shot_search::{COMPLAINTS_MAX, ShotAnswer, ShotRequest, ShotSearch, ShotSink};
+pub use shot_tables::{
+    instant_of_table, leap_second_clock, refuse_tables, state_nadir_by_range, tables_among,
+};
 pub use site::STAGES;
 pub use sites::publish_sites;
 pub use task::Task;

@@ -120,7 +120,7 @@ fn commands(page: &Path) -> Vec<String> {
     for block in text.split("```").skip(1).step_by(2) {
         let (language, block) = block.split_once('\n').unwrap();
         assert!(
-            ["sh", "text", "toml", "json"].contains(&language),
+            ["sh", "text", "toml", "json", "python"].contains(&language),
             "{}: a block of {language:?}",
             page.display()
         );

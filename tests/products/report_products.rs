@@ -244,26 +244,3 @@ fn every_figure_is_a_file_with_number_legend_and_caption() {
     let files = fs::read_dir(folder.join("report/figures")).unwrap().count();
     assert_eq!(files, figures.len());
 }
-
-#[test]
-fn the_notebook_reads_the_products_and_finds_their_numbers() {
-    let Some(mut run) = readers::python("notebook.py", "the_notebook_reads_the_products") else {
-        return;
-    };
-    let notebook = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/notebooks/first_site.ipynb");
-    let printed = readers::output(run.arg(notebook).arg(gusev()));
-    let document = common::json(&gusev().join("adjustment.json"));
-    for (column, round) in [
-        ("above_surface_m", "before"),
-        ("adjusted_above_surface_m", "after"),
-    ] {
-        let heights = &document[round]["heights"]["above_surface_m"];
-        let median_m = heights["median"].as_f64().unwrap();
-        let told = format!(
-            "median of {column}: {median_m:.3} m of {} tie points",
-            heights["n"]
-        );
-        assert!(printed.contains(&told), "{told}\n{printed}");
-    }
-    assert!(printed.contains("gusev_crater valid") && printed.contains("figures: 3"));
-}

@@ -48,6 +48,21 @@ pub enum BiasScope {
 }
 
 impl MolaClock {
+    /// A clock whose tags are late by `late_s`, or early if it is negative, for the position of the spacecraft.
+    #[must_use]
+    pub fn late_by(late_s: f64, source: String) -> Self {
+        Self {
+            bias_s: late_s.abs(),
+            sign: if late_s < 0.0 {
+                TagSign::Early
+            } else {
+                TagSign::Late
+            },
+            scope: BiasScope::SpkLookup,
+            source,
+        }
+    }
+
     /// Seconds to add to a tag: `−bias` for late tags, `+bias` for early ones, 0 when switched off.
     #[must_use]
     pub fn correction_s(&self) -> f64 {

@@ -18,7 +18,7 @@ use super::{
     geoparquet::geo_metadata,
     parquet,
     rows_file::{GEOMETRY, RowsFormat, RowsWriter, SEARCH},
-    table::Table,
+    table::{Meaning, Table},
 };
 use areograph_base::{
     body::Body,
@@ -81,6 +81,120 @@ fn table(rows: Vec<Shot<'_>>, format: RowsFormat) -> Table<'_> {
     }
 }
 
+/// Shots that wait until there are enough of them, with their windows.
+struct Pending(Footprints<AsRead>, WindowLists);
+
+impl Default for Pending {
+    fn default() -> Self {
+        Self(Footprints::new(Vec::new()), WindowLists::default())
+    }
+}
+
+impl Pending {
+    fn append(&mut self, footprints: Footprints<AsRead>, windows: &WindowLists) {
+        self.0.append(footprints);
+        self.1.append(windows);
+    }
+
+    /// The first shots, at most `ROWS_AT_ONCE`, if there are `at_least` of them.
+    fn take(&mut self, at_least: usize) -> Option<(Footprints<AsRead>, WindowLists)> {
+        let rows = self.0.len();
+        (rows >= at_least.max(1)).then(|| {
+            let first = rows.min(ROWS_AT_ONCE);
+            let left = Self(self.0.split_off(first), self.1.split_off(first));
+            let Self(footprints, windows) = mem::replace(self, left);
+            (footprints, windows)
+        })
+    }
+}
+
+/// Shots of a search as record batches in memory.
+pub struct ShotBatches {
+    columns: Vec<String>,
+    schema: SchemaRef,
+    sources: Vec<SourceFile>,
+    window_ids: Vec<String>,
+    pending: Pending,
+    batches: Vec<RecordBatch>,
+}
+
+impl ShotBatches {
+    /// No shots yet.
+    ///
+    /// * `columns` – names of [`Self::names`]; their order has no effect, unknown names are omitted
+    /// * `sources` – the files that shots are counted into
+    /// * `window_ids` – identifiers of the windows
+    #[must_use]
+    pub fn new(columns: Vec<String>, sources: Vec<SourceFile>, window_ids: Vec<String>) -> Self {
+        let table =
+            table(Vec::new(), RowsFormat::Parquet).keep(|column| is_among(column, &columns));
+        let geo = geo_metadata(Body::Mars, None, None).to_string();
+        let frame = frame(Body::Mars).to_owned();
+        let notes = [("geo".to_owned(), geo), ("frame".to_owned(), frame)];
+        let schema = Schema::clone(&parquet::schema(&table)).with_metadata(notes.into());
+        Self {
+            columns,
+            schema: Arc::new(schema),
+            sources,
+            window_ids,
+            pending: Pending::default(),
+            batches: Vec::new(),
+        }
+    }
+
+    /// All columns, in order: those of `footprints.parquet` without UTC.
+    #[must_use]
+    pub fn names() -> Vec<&'static str> {
+        let table = table(Vec::new(), RowsFormat::Parquet);
+        table.columns().map(|column| column.name).collect()
+    }
+
+    /// Appends shots with their windows.
+    ///
+    /// # Errors
+    /// Numbers that are not finite.
+    pub fn push(&mut self, footprints: Footprints<AsRead>, windows: &WindowLists) -> Result<()> {
+        self.pending.append(footprints, windows);
+        while let Some((footprints, windows)) = self.pending.take(ROWS_AT_ONCE) {
+            self.assemble(footprints, &windows)?;
+        }
+        Ok(())
+    }
+
+    fn assemble(&mut self, footprints: Footprints<AsRead>, windows: &WindowLists) -> Result<()> {
+        let footprints = convert_at_tags(footprints, &self.sources);
+        let shots = FoundShots {
+            footprints: &footprints,
+            windows,
+            window_ids: &self.window_ids,
+        };
+        let table =
+            table(shots.rows(), RowsFormat::Parquet).keep(|column| is_among(column, &self.columns));
+        self.batches.push(parquet::record_batch(
+            &table,
+            &self.schema,
+            0..table.rows(),
+        )?);
+        Ok(())
+    }
+
+    /// The schema, with the metadata of `GeoParquet`, and all shots.
+    ///
+    /// # Errors
+    /// As [`Self::push`].
+    pub fn finish(mut self) -> Result<(SchemaRef, Vec<RecordBatch>)> {
+        if let Some((footprints, windows)) = self.pending.take(1) {
+            self.assemble(footprints, &windows)?;
+        }
+        Ok((self.schema, self.batches))
+    }
+}
+
+/// Whether a column has one of these names.
+fn is_among(column: &Meaning, names: &[String]) -> bool {
+    names.iter().any(|name| name == column.name)
+}
+
 /// A file of shots that is being written; it is renamed to its final name when finished.
 ///
 /// Parquet is GeoParquet 1.1 with bounding boxes; the query is written to a file beside CSV.
@@ -92,8 +206,7 @@ pub struct ShotsFile {
     /// The files that shots are counted into.
     sources: Vec<SourceFile>,
     window_ids: Vec<String>,
-    /// Shots that are not written yet, with their windows.
-    pending: (Footprints<AsRead>, WindowLists),
+    pending: Pending,
     bounds: Option<[f64; 4]>,
 }
 
@@ -126,7 +239,7 @@ impl ShotsFile {
             schema,
             sources,
             window_ids,
-            pending: (Footprints::new(Vec::new()), WindowLists::default()),
+            pending: Pending::default(),
             bounds: None,
         })
     }
@@ -136,31 +249,18 @@ impl ShotsFile {
     /// # Errors
     /// Numbers that are not finite; errors of the disk.
     pub fn write(&mut self, footprints: Footprints<AsRead>, windows: &WindowLists) -> Result<()> {
-        self.pending.0.append(footprints);
-        self.pending.1.append(windows);
-        while self.pending.0.len() >= ROWS_AT_ONCE {
-            let (footprints, windows) = &mut self.pending;
-            let left = (
-                footprints.split_off(ROWS_AT_ONCE),
-                windows.split_off(ROWS_AT_ONCE),
-            );
-            self.write_pending()?;
-            self.pending = left;
+        self.pending.append(footprints, windows);
+        while let Some((footprints, windows)) = self.pending.take(ROWS_AT_ONCE) {
+            self.write_rows(footprints, &windows)?;
         }
         Ok(())
     }
 
-    /// Writes all pending shots.
-    fn write_pending(&mut self) -> Result<()> {
-        let empty = (Footprints::new(Vec::new()), WindowLists::default());
-        let (footprints, windows) = mem::replace(&mut self.pending, empty);
-        if footprints.is_empty() {
-            return Ok(());
-        }
+    fn write_rows(&mut self, footprints: Footprints<AsRead>, windows: &WindowLists) -> Result<()> {
         let footprints = convert_at_tags(footprints, &self.sources);
         let shots = FoundShots {
             footprints: &footprints,
-            windows: &windows,
+            windows,
             window_ids: &self.window_ids,
         };
         let points_deg = shots.points_deg();
@@ -189,7 +289,9 @@ impl ShotsFile {
     /// # Errors
     /// Errors of the disk; a file that is read back with another number of rows.
     pub fn finish(mut self, search: &Value) -> Result<u64> {
-        self.write_pending()?;
+        if let Some((footprints, windows)) = self.pending.take(1) {
+            self.write_rows(footprints, &windows)?;
+        }
         let mut notes = vec![(SEARCH, search.to_string())];
         match self.format {
             RowsFormat::Parquet => {

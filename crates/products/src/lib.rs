@@ -81,7 +81,7 @@ pub use exchange::{
     write_gcp, write_lidar_data,
 };
 pub use files::{read_bytes, write_bytes, write_json};
-pub use found_shots::ShotsFile;
+pub use found_shots::{ShotBatches, ShotsFile};
 pub use generated::{documentation, schemas};
 pub use geotiff::{GeoTiff, Number};
 pub use laser_match::{MatchProducts, write_match_products};

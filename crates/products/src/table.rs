@@ -324,7 +324,8 @@ impl<'a> Table<'a> {
         self
     }
 
-    fn keep(mut self, required: impl Fn(&Meaning) -> bool) -> Self {
+    /// With only the columns that are required.
+    pub(super) fn keep(mut self, required: impl Fn(&Meaning) -> bool) -> Self {
         self.columns.retain(|(_, column)| required(column));
         self
     }

@@ -1,6 +1,11 @@
 //! Start of a service: configuration, lock, database, all checked; and reloading of its configuration.
 
-use std::{net::SocketAddr, path::Path, process};
+use std::{
+    net::SocketAddr,
+    path::{Path, PathBuf},
+    process,
+    sync::OnceLock,
+};
 
 use rusqlite::{Connection, Transaction};
 use serde_json::json;
@@ -75,6 +80,14 @@ pub fn configuration(
     Ok(config)
 }
 
+/// The file that starts the program, where this is not the file of the process.
+static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
+
+/// States the file that starts the program, for a process of another language; the first statement counts.
+pub fn set_program(program: PathBuf) {
+    let _ = PROGRAM.set(program);
+}
+
 /// Starts a service; `command` is the name shown to other processes.
 ///
 /// # Errors
@@ -99,9 +112,12 @@ pub fn start(config: ServiceConfig, command: &str, clock: Clock) -> Result<Start
     database
         .read(|connection| seen(connection, &config))
         .in_file(&state)??;
-    let program = std::env::current_exe()
-        .map_err(IoError::on("find"))
-        .in_file("areograph")?;
+    let program = match PROGRAM.get() {
+        Some(program) => program.clone(),
+        None => std::env::current_exe()
+            .map_err(IoError::on("find"))
+            .in_file("areograph")?,
+    };
     let shared = Shared::new(config, database, clock, program).in_file(&state)?;
     shared.set_recovering(lost);
     Ok(Started {

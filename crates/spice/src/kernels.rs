@@ -72,6 +72,21 @@ pub struct KernelSet {
 }
 
 impl KernelSet {
+    /// The kernels of a metakernel, if this is the only file and ends in `.tm`, else these kernels in load order.
+    ///
+    /// # Errors
+    /// As of [`Self::from_metakernel`] and [`Self::from_files`].
+    pub fn named(files: &[PathBuf]) -> Result<Self> {
+        let is_metakernel = |path: &PathBuf| {
+            let ending = path.extension();
+            ending.is_some_and(|ending| ending.eq_ignore_ascii_case("tm"))
+        };
+        match files {
+            [one] if is_metakernel(one) => Self::from_metakernel(one),
+            files => Self::from_files(files),
+        }
+    }
+
     /// These files in this order; of files with the same content only the last one is loaded, since in SPICE the last
     /// one wins.
     ///

@@ -5,14 +5,12 @@ use std::path::PathBuf;
 use clap::{ArgGroup, Args};
 use serde_json::{Value, json};
 
-use super::{
-    filter::{FilterArguments, GroundArgument},
-    tables,
-};
+use super::filter::{FilterArguments, GroundArgument};
 use crate::{
     cli::{output, stop::Signals, windows::WindowArguments},
     config::{MolaSurfaceConfig, WindowConfig},
     error::{Cause, Error, Result},
+    flow::tables_among,
     footprints::{AsRead, Footprints, SourceFile},
     geom::{ellipsoid::Spherical, window::Region},
     pds::archive::{Found, Judged, Opened, Query, Seen, Sink, Source, search, search_tables},
@@ -73,7 +71,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
     let filter = arguments.shots.filter();
     let regions = windows.iter().map(|window| Region::new(&window.shape));
     let query = Query::new(regions.collect(), &filter, Judged::Near);
-    let mut shots = if tables::tables_among(&arguments.paths)? {
+    let mut shots = if tables_among(&arguments.paths)? {
         let found = search_tables(&arguments.paths, &query, None, signals.stop())?;
         let files = found.tables.iter().map(|table| table.file.clone());
         let mut shots = Shots::of(files.collect(), found.failures);

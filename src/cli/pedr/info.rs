@@ -9,10 +9,11 @@ use std::{
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::tables::{self, TableCounts};
+use super::tables::TableCounts;
 use crate::{
     cli::output,
     error::{Error, Locate as _},
+    flow::instant_of_table,
     geom::statistics::Summary,
     pds::{
         pedr::{Counts, File},
@@ -119,7 +120,7 @@ fn info(path: &Path, file: &File, clock: Option<&Session>) -> Result<(Counts, Va
 }
 
 fn info_of_table(path: &Path, clock: Option<&Session>) -> Result<Value, Error> {
-    let utc = |text: &str| tables::instant(clock, text);
+    let utc = |text: &str| instant_of_table(clock, text);
     let counts = TableCounts::of(path, clock.map(|_| &utc as _))?;
     let mut answer = counts.answer(path)?;
     add_utc(&mut answer, clock, counts.span_s())?;

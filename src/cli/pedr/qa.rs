@@ -4,16 +4,15 @@ use std::{path::PathBuf, process::ExitCode};
 
 use clap::Args;
 
-use super::tables;
 use crate::{
-    altimetry::{BiasScope, MolaClock, TagSign},
+    altimetry::MolaClock,
     cli::{
         report,
         single::{self, RunArguments},
     },
     config::usual_altimeter,
     error::Cause,
-    flow::{ArchiveRequest, Task},
+    flow::{ArchiveRequest, Task, refuse_tables},
 };
 
 /// Checks every shot of an archive against kernels: measured range minus distance, profile by profile.
@@ -62,20 +61,12 @@ impl Arguments {
         }
         let usual = usual_altimeter();
         let is_usual = (bias_s - usual.clock_bias_s).abs() <= 0.0;
-        Ok(MolaClock {
-            bias_s: bias_s.abs(),
-            sign: if bias_s < 0.0 {
-                TagSign::Early
-            } else {
-                TagSign::Late
-            },
-            scope: BiasScope::SpkLookup,
-            source: if is_usual {
-                usual.clock_source.clone()
-            } else {
-                "as given on the command line".to_owned()
-            },
-        })
+        let source = if is_usual {
+            usual.clock_source.clone()
+        } else {
+            "as given on the command line".to_owned()
+        };
+        Ok(MolaClock::late_by(bias_s, source))
     }
 }
 
@@ -87,7 +78,7 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
             .num_threads(usize::from(threads.get()))
             .build_global();
     }
-    let clock = tables::refuse(&arguments.paths).and_then(|()| Ok(arguments.clock()?));
+    let clock = refuse_tables(&arguments.paths).and_then(|()| Ok(arguments.clock()?));
     let clock = match clock {
         Ok(clock) => clock,
         Err(failure) => return report(&failure),

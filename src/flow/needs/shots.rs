@@ -71,7 +71,8 @@ pub(super) fn wishes(
 }
 
 /// The tables of a box: west, east, south and north edge, degrees.
-pub(super) fn of_box(folder: &Path, edges_deg: [f64; 4]) -> ShotWish {
+#[must_use]
+pub fn of_box(folder: &Path, edges_deg: [f64; 4]) -> ShotWish {
     let [west, east, south, north] = edges_deg;
     let name = format!("box_{west}_{east}_{south}_{north}");
     let pieces = cut(&name, "--box", &[edges_deg]);

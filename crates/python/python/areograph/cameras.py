@@ -1,0 +1,242 @@
+"""Cameras of line scanners: support data, orientation, and the two directions between image and ground."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import tempfile
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, TypeAlias, cast
+
+import numpy
+import pyarrow
+
+from . import _native
+from ._common import Paths, StrPath, column, optional, paths_of, provenance
+from .errors import InputError, InvalidProducts, UsageError
+from .results import open_result
+
+if TYPE_CHECKING:
+    from xarray import Dataset
+    from numpy.typing import NDArray
+
+#: Support data, or their file (``.json``).
+Image: TypeAlias = "dict[str, Any] | StrPath"
+Numbers: TypeAlias = "NDArray[numpy.float64]"
+
+#: Iterations of ray and surface, and the change of the radius at which they end, metres.
+_ITERATIONS = 50
+_TOLERANCE_M = 1e-3
+
+
+def load(label: StrPath, kernels: Paths | None = None, *, format: str = "isd") -> dict[str, Any]:
+    """Compute the support data of an image (ISD of the Community Sensor Model) from its label and kernels.
+
+    Parameters
+    ----------
+    label
+        Label of a MOC image, or a file with its label, such as ``.imq``.
+    kernels
+        A metakernel (``.tm``), a folder of kernels, or kernels in load order.
+    format
+        ``"isd"``, the only format.
+
+    Returns
+    -------
+    dict
+        Support data as ``usgscsm`` reads them, the file ``isd.json`` of a run. They state the pointing bias and the
+        light-time convention; see the guide for the differences from ALE.
+
+    Raises
+    ------
+    CoverageError
+        If the kernels do not cover the image.
+    InvalidProducts
+        If the orientation is not valid, such as an attitude that is held over gaps of the kernels.
+    """
+    if format != "isd":
+        raise UsageError(f"format is {format!r}; expected 'isd'")
+    if kernels is None:
+        raise UsageError("no kernels; expected a metakernel, a folder, or kernels in load order")
+    files = [os.path.abspath(path) for path in paths_of(kernels)]
+    if len(files) == 1 and os.path.isdir(files[0]):
+        source = f"root = {_text(files[0])}"
+    elif len(files) == 1 and files[0].lower().endswith(".tm"):
+        source = f"metakernel = {_text(files[0])}"
+    else:
+        source = f"files = [{', '.join(map(_text, files))}]"
+    path = os.path.abspath(label)
+    if not os.path.isfile(path):
+        raise InputError(f"{path}: no such file; expected the label of an image")
+    # Identifiers of images have letters, digits, points, hyphens and underscores.
+    name = re.sub(r"[^A-Za-z0-9._-]", "-", os.path.splitext(os.path.basename(path))[0])
+    with tempfile.TemporaryDirectory() as folder:
+        site, out = os.path.join(folder, "site.toml"), os.path.join(folder, "out")
+        with open(site, "w", encoding="utf-8") as file:
+            file.write(f'site = "image"\n[kernels]\n{source}\n')
+            file.write(f"[[images]]\nid = {_text(name)}\nlabel = {_text(path)}\n")
+        # Its remarks concern the missing shots.
+        _native.run(site, out, False, None)
+        result = open_result(os.path.join(out, "image"))
+        if not result.valid:
+            raise InvalidProducts(f"{path}: {'; '.join(result.reasons)}")
+        return result.isd(result.images[0])
+
+
+def orientation(image: Image, kernels: Paths | None = None, *, step_lines: float = 1.0) -> Dataset:
+    """Compute position and attitude of the camera along an image.
+
+    Parameters
+    ----------
+    image
+        Support data or their file (``.json``); with ``kernels``, a label.
+    kernels
+        As of `load`.
+    step_lines
+        Lines between two poses; the last line is included.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``position_m`` (``line``, ``xyz``): perspective centre, body-fixed, in the light-time convention of the support
+        data; ``quaternion`` (``line``, ``wxyz``): rotation
+        from the axes of the camera to those of the body; coordinates ``line`` (0 at the outer edge of the first line)
+        and ``et_s``.
+    """
+    xarray = optional("xarray", "xarray")
+    if not step_lines > 0.0:
+        raise UsageError(f"step_lines is {step_lines}; expected a number above 0")
+    isd = load(cast(StrPath, image), kernels) if kernels is not None else _support(image)
+    camera = _camera(isd)
+    lines = camera.shape[0]
+    line = numpy.arange(0.0, lines, step_lines)
+    line = numpy.append(line, float(lines))
+    table = pyarrow.table(camera.poses(line))
+    names = table.column_names
+    values = numpy.column_stack([table[name].to_numpy() for name in names])
+    dataset: Dataset = xarray.Dataset(
+        {
+            "position_m": (("line", "xyz"), values[:, 1:4], {"units": "m"}),
+            "quaternion": (("line", "wxyz"), values[:, 4:8]),
+        },
+        coords={
+            "line": ("line", line, {"long_name": "line, 0 at the outer edge of the first"}),
+            "et_s": ("line", values[:, 0], {"units": "s", "long_name": "TDB seconds past J2000"}),
+            "xyz": ["x", "y", "z"],
+            "wxyz": ["w", "x", "y", "z"],
+        },
+        attrs=provenance(image=isd.get("image_identifier"), support=isd.get("areograph")),
+    )
+    return dataset
+
+
+def ground_to_image(
+    image: Image, longitude_deg: Any, latitude_deg: Any, radius_m: Any
+) -> tuple[Numbers, Numbers, NDArray[numpy.bool_]]:
+    """Find the line and sample that see points on the ground.
+
+    Parameters
+    ----------
+    image
+        Support data or their file.
+    longitude_deg, latitude_deg, radius_m
+        Points: east longitude, areocentric latitude, distance from the centre of the body; numbers or arrays of one
+        shape.
+
+    Returns
+    -------
+    line, sample, valid
+        Lines and samples are 0 at the outer edge of the first line or sample. ``valid`` states whether the image shows
+        the point; a point that no line sees has NaN.
+    """
+    points = numpy.broadcast_arrays(longitude_deg, latitude_deg, radius_m)
+    table = pyarrow.table(_camera(_support(image)).project(*(column(values) for values in points)))
+    shape = points[0].shape
+    line, sample, valid = (
+        table[name].to_numpy().reshape(shape) for name in ("line", "sample", "valid")
+    )
+    return line, sample, valid
+
+
+def image_to_ground(
+    image: Image,
+    line: Any,
+    sample: Any,
+    *,
+    surface: float | Callable[[Numbers, Numbers], Any] | None = None,
+) -> tuple[Numbers, Numbers, Numbers]:
+    """Find the points on the ground at image positions.
+
+    Parameters
+    ----------
+    image
+        Support data or their file.
+    line, sample
+        Positions, 0 at the outer edge of the first line or sample; numbers or arrays of one shape.
+    surface
+        The ground: a radius in metres, or a function that returns radii in metres at arrays of longitudes and latitudes in
+        degrees. By default the ellipsoid of the body.
+
+    Returns
+    -------
+    longitude_deg, latitude_deg, radius_m
+        NaN where the position is outside the image, a ray meets no ground, or the iteration over ``surface`` does not
+        converge to 1 mm. Support data state no accuracy: for standard deviations use the products of an adjustment.
+    """
+    positions = numpy.broadcast_arrays(line, sample)
+    shape = positions[0].shape
+    camera, pixels = _camera(_support(image)), (column(positions[0]), column(positions[1]))
+    if surface is None:
+        ground = _ground(camera.intersect(*pixels))
+    elif callable(surface):
+        ground = _on_surface(camera, pixels, surface)
+    else:
+        radius_m = numpy.full(pixels[0].shape, float(surface))
+        ground = _ground(camera.intersect(*pixels, radius_m))
+    longitude_deg, latitude_deg, radius_m = (values.reshape(shape) for values in ground)
+    return longitude_deg, latitude_deg, radius_m
+
+
+def _on_surface(
+    camera: _native.Camera, pixels: tuple[Numbers, Numbers], surface: Callable[[Numbers, Numbers], Any]
+) -> list[Numbers]:
+    longitude_deg, latitude_deg, radius_m = _ground(camera.intersect(*pixels))
+    change_m = numpy.full(radius_m.shape, numpy.inf)
+    for _ in range(_ITERATIONS):
+        surface_m = column(surface(longitude_deg, latitude_deg))
+        # A place outside the surface keeps NaN from here on.
+        change_m = numpy.abs(surface_m - radius_m)
+        longitude_deg, latitude_deg, radius_m = _ground(camera.intersect(*pixels, surface_m))
+        if not numpy.any(change_m > _TOLERANCE_M):
+            break
+    found = change_m <= _TOLERANCE_M
+    return [numpy.where(found, values, numpy.nan) for values in (longitude_deg, latitude_deg, radius_m)]
+
+
+def _ground(columns: _native.Columns) -> list[Numbers]:
+    table = pyarrow.table(columns)
+    return [table[name].to_numpy() for name in ("longitude_deg", "latitude_deg", "radius_m")]
+
+
+def _support(image: Image) -> dict[str, Any]:
+    if isinstance(image, dict):
+        return image
+    path = os.fspath(image)
+    try:
+        with open(path, encoding="utf-8") as file:
+            return cast("dict[str, Any]", json.load(file))
+    except ValueError:
+        expected = "support data (JSON); for a label use load(label, kernels)"
+        raise InputError(f"{path}: not JSON; expected {expected}") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot read: {error.strerror}") from error
+
+
+def _camera(isd: dict[str, Any]) -> _native.Camera:
+    return _native.Camera(json.dumps(isd))
+
+
+def _text(path: str) -> str:
+    # A basic string of TOML has the escapes of JSON.
+    return json.dumps(path, ensure_ascii=False)

@@ -1,0 +1,46 @@
+"""Spacecraft states and kernel comparisons against CSPICE as another package calls it."""
+
+from __future__ import annotations
+
+import numpy
+import pytest
+import spiceypy
+from conftest import Mission, cspice
+
+import areograph as ag
+
+
+def test_states_are_those_of_cspice(mission: Mission) -> None:
+    et_s = float(mission.gusev.footprints["et_s"].iloc[0]) + numpy.arange(0.0, 60.0, 15.0)
+    for frame in ("J2000", "IAU_MARS"):
+        states = ag.spacecraft_state(et_s, mission.kernels, frame=frame)
+        with cspice(mission):
+            for number, et in enumerate(et_s):
+                state, _ = spiceypy.spkezr("-94", et, frame, "NONE", "499")
+                # Metres and metres per second: rounding, and the moving pole in the velocity.
+                assert numpy.abs(1e3 * state[:3] - states["position_m"][number].values).max() < 1e-3
+                assert numpy.abs(1e3 * state[3:] - states["velocity_m_s"][number].values).max() < 1e-4
+                utc = spiceypy.et2utc(et, "ISOC", 3)
+                assert states["utc"][number].item().rstrip("Z") == utc
+    by_utc = ag.spacecraft_state(list(states["utc"].values), mission.kernels)
+    assert numpy.abs(by_utc["et"].values - et_s).max() < 1e-3
+    names = [kernel["name"] for kernel in states.attrs["areograph"]["kernels"]]
+    assert "leapseconds.tls" in names
+
+
+def test_differences_of_kernel_sets_are_those_of_their_states(mission: Mission) -> None:
+    folder = mission.folder / "kernels"
+    start, stop = (mission.gusev.shots["utc"].min(), mission.gusev.shots["utc"].max())
+    ends = [end.strftime("%Y-%m-%dT%H:%M:%S") for end in (start, stop)]
+    compared = ag.compare_kernels(folder / "nav.tm", folder / "gsfc.tm", t0=ends[0], t1=ends[1])
+    et_s = compared["et"].values[:: max(1, compared.sizes["et"] // 5)]
+    a, b = (ag.spacecraft_state(et_s, folder / name, frame="J2000")["position_m"] for name in ("nav.tm", "gsfc.tm"))
+    apart_m = numpy.linalg.norm((b - a).values, axis=1)
+    deviation = compared["position_m"].sel(et=et_s, set="b") - compared["position_m"].sel(et=et_s, set="a")
+    # Metres: both are distances between the two orbits.
+    assert numpy.abs(numpy.linalg.norm(deviation.values, axis=1) - apart_m).max() < 1e-3
+    assert apart_m.max() > 1.0
+    with pytest.raises(ag.UsageError, match="same kernels"):
+        ag.compare_kernels(folder / "nav.tm", folder / "nav.tm")
+    with pytest.raises(ag.UsageError, match="only one"):
+        ag.compare_kernels(folder / "nav.tm", folder / "gsfc.tm", t0=ends[0])
