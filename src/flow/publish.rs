@@ -30,7 +30,7 @@ use crate::{
 };
 
 /// Raised when the layout of products changes.
-const METHOD: u32 = 32;
+const METHOD: u32 = 33;
 
 /// The products of a site.
 pub(super) struct SitePublication<'a> {

@@ -117,6 +117,9 @@ fn jigsaw_finds_its_files(site: &Path, named: usize) {
     let network = read_ties(&site.join("exchange/adjusted.pvl")).unwrap();
     assert_eq!((network.ties.len(), network.ignored), (154 - named, named));
     assert_eq!(network.complaints, []);
+    // The binary form has the same points and measures.
+    let binary = read_ties(&site.join("exchange/adjusted.net")).unwrap();
+    assert_eq!(binary, network);
     let text = |path: &str| fs::read_to_string(site.join("exchange").join(path)).unwrap();
     let rows = |text: &str, heads: usize| {
         let rows = text.lines().skip(heads);

@@ -25,6 +25,7 @@ mod inputs_apart;
 #[cfg(all(target_os = "linux", target_arch = "x86_64"))]
 mod killed_writers;
 mod mission;
+mod networks;
 mod pds_archive_index;
 mod pds_records;
 mod pedr_qa;

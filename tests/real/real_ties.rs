@@ -5,7 +5,10 @@ use crate::common;
 
 use std::collections::BTreeSet;
 
-use areograph::pds::ties::{TieFile, read_ties};
+use areograph::{
+    pds::ties::{TieFile, read_ties},
+    ties::TieMeasure,
+};
 
 fn images(file: &TieFile) -> BTreeSet<&str> {
     let measures = file.ties.iter().flat_map(|tie| &tie.measures);
@@ -45,18 +48,27 @@ fn the_measures_of_a_moc_network_are_read() {
 }
 
 #[test]
-fn the_binary_network_says_how_to_convert_it() {
-    let name = "the_binary_network_says_how_to_convert_it";
-    let Some(path) = common::real_data("asp_moc/control.net", name) else {
+fn the_binary_network_has_the_measures_of_its_table() {
+    let name = "the_binary_network_has_the_measures_of_its_table";
+    let (Some(path), Some(table)) = (
+        common::real_data("asp_moc/control.net", name),
+        common::real_data("asp_moc/control_net_measures.csv", name),
+    ) else {
         return;
     };
-    let failure = read_ties(&path).unwrap_err();
-    assert_eq!(failure.kind().exit_code(), 3);
-    let message = failure.to_string();
-    assert!(
-        message.contains("control.net") && message.contains("cnetbin2pvl"),
-        "{message}"
-    );
+    let (file, table) = (read_ties(&path).unwrap(), read_ties(&table).unwrap());
+    assert!(file.complaints.is_empty(), "{:?}", file.complaints);
+    assert_eq!(file.ignored, 0);
+    // The table has no standard deviations and no known ground.
+    let places = |file: &TieFile| -> Vec<(String, String, f64, f64)> {
+        let measures = file.ties.iter().flat_map(|tie| {
+            let place =
+                |of: &TieMeasure<String>| (tie.id.clone(), of.image.clone(), of.line, of.sample);
+            tie.measures.iter().map(place)
+        });
+        measures.collect()
+    };
+    assert_eq!(places(&file), places(&table));
 }
 
 #[test]

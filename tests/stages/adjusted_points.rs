@@ -5,7 +5,7 @@
     reason = "helpers of tests may fail loudly"
 )]
 
-use crate::common;
+use crate::common::{self, readers};
 
 use std::{fs, path::PathBuf};
 
@@ -18,8 +18,8 @@ use areograph::{
     pds::ties::read_ties,
     products::{
         ControlMeasure, ControlNetwork, ControlPoint, GroundEstimate, ImageMeasure, LidarPoint,
-        NetworkMeasure, NetworkPoint, ProfileShift, isis_serial_number, write_control_network,
-        write_gcp, write_lidar_data,
+        NetworkMeasure, NetworkPoint, ProfileShift, isis_serial_number, write_binary_network,
+        write_control_network, write_gcp, write_lidar_data,
     },
     spice::{KernelSet, Session},
     stages::tag_times::tag_times,
@@ -378,6 +378,14 @@ fn a_control_network_is_read_again_as_it_was_written() {
             assert!((read.line - written.measure.line).abs() < 1e-12);
             assert!((read.sample - written.measure.sample).abs() < 1e-12);
         }
+    }
+    let binary = folder.path().join("exchange/adjusted.net");
+    assert_eq!(write_binary_network(&binary, &network).unwrap(), 4);
+    assert_eq!(read_ties(&binary).unwrap(), file);
+    let name = "a_network_is_read_as_written";
+    if let Some(mut reader) = readers::python("read_network.py", name) {
+        let read = readers::output(reader.arg(&binary).arg(&path));
+        assert_eq!(read, "4 points, 8 measures\n");
     }
     let text = fs::read_to_string(&path).unwrap();
     for line in [

@@ -19,8 +19,7 @@ use super::{
 declare_table! {
     /// Tie points between the images. Without this table, there is no intersection and no adjustment.
     pub struct TiesConfig: Deserialize {
-        /// Paths or globs, as in `[pedr]`, of tables (.csv) or of ISIS control networks in PVL (convert binary networks
-        /// with cnetbin2pvl). Tables have one row per measurement: `point_id`, `serial_number`, `sample`, `line` and,
+        /// Paths or globs, as in `[pedr]`, of tables (.csv) or of ISIS control networks, binary or in PVL. Tables have one row per measurement: `point_id`, `serial_number`, `sample`, `line` and,
         /// where known, the standard deviations `line_sigma_px` and `sample_sigma_px`. Fixed or constrained points of
         /// control networks provide coordinates in IAU 2000. Lines and samples are counted as in ISIS: the middle of
         /// the first pixel is 1. `serial_number` is the `serial_number` or `id` of an image; measurements in other

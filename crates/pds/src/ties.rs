@@ -1,17 +1,23 @@
-//! Tie points from a table, and from ISIS control networks as text (PVL).
+//! Tie points from a table, and from ISIS control networks as text (PVL) or binary.
 //!
 //! Both count lines and samples as ISIS does: the middle of the first pixel is 1.
 
+mod binary_network;
+pub mod messages;
 mod network;
 
 use std::{collections::BTreeMap, fs, path::Path};
 
-use super::{file_size::SizedFile, label::LabelError};
+use super::{
+    file_size::SizedFile,
+    label::{LabelError, parse_whole},
+};
 use areograph_base::{
     error::{Cause, IoError, Locate, Result},
     ties::{KnownGround, TieMeasure, TiePoint},
 };
-use network::parse_network;
+use binary_network::parse_binary_network;
+use network::parse_text_network;
 
 /// ISIS counts the middle of the first pixel as 1; here its outer edge is 0.
 pub const ISIS_TO_EDGE: f64 = -0.5;
@@ -30,7 +36,7 @@ pub struct TieFile {
 /// A skipped record.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TieComplaint {
-    /// Line of a table, or number of the object or group in a network, both from 1.
+    /// Line of a table, number of the object or group in a network, or number of the point in a binary one, from 1.
     pub record: u64,
     /// The value found and the value expected.
     pub text: String,
@@ -40,11 +46,31 @@ pub struct TieComplaint {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, Cause)]
 #[cause(Input)]
 enum TieError {
-    #[error("this is a binary control network; expected its text form (PVL)")]
+    #[error("this is a binary control network of version {0}; expected version 2 or 5")]
     #[cause("convert it with ISIS: cnetbin2pvl from=control.net to=control.pvl")]
-    Binary,
+    BinaryVersion(u64),
+    #[error("{key} of the label of a binary control network is {value}; expected a number")]
+    #[cause("transfer the file again as binary, or write it again with ISIS")]
+    BinaryLabel { key: &'static str, value: String },
+    #[error(
+        "the file has {bytes} bytes; expected the {what} of a binary control network up to byte {end}"
+    )]
+    #[cause(like = BinaryLabel)]
+    BinaryShort {
+        what: &'static str,
+        end: u64,
+        bytes: u64,
+    },
+    #[error("the header of the binary control network cannot be read: {0}")]
+    #[cause(like = BinaryLabel)]
+    BinaryHeader(String),
+    #[error(
+        "the sizes of the points of the binary control network do not fill the bytes that its label states"
+    )]
+    #[cause(like = BinaryLabel)]
+    BinarySizes,
     #[error("no ControlNetwork object found")]
-    #[cause("give an ISIS control network in PVL, or a CSV table")]
+    #[cause("give an ISIS control network, or a CSV table")]
     NoNetwork,
     #[error("column {0} is missing; expected point_id, serial_number, sample and line")]
     #[cause(
@@ -73,7 +99,7 @@ enum TieError {
 /// Reads tie points; a file whose name ends in `.csv` is a table, any other a control network.
 ///
 /// # Errors
-/// The file cannot be read; a binary network; no network; missing columns; no readable record.
+/// The file cannot be read; no network; missing columns; no readable record.
 pub fn read_ties(path: &Path) -> Result<TieFile> {
     SizedFile::Ties.require(path)?;
     let bytes = fs::read(path).map_err(IoError::on("read")).in_file(path)?;
@@ -86,6 +112,20 @@ pub fn read_ties(path: &Path) -> Result<TieFile> {
         parse_network(&bytes)
     };
     ties.and_then(readable).in_file(path)
+}
+
+/// A control network of either form.
+fn parse_network(bytes: &[u8]) -> std::result::Result<TieFile, TieError> {
+    let label = parse_whole(bytes)?;
+    let is_in = |name: &str| label.entries.iter().any(|entry| entry.group == name);
+    // The label of the binary form states where its bytes start.
+    if is_in("PROTOBUFFER") || is_in("CORE") {
+        parse_binary_network(&label, bytes)
+    } else if is_in("CONTROLNETWORK") {
+        Ok(parse_text_network(&label))
+    } else {
+        Err(TieError::NoNetwork)
+    }
 }
 
 /// Rejects a file without a valid record.

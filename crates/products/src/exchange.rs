@@ -1,6 +1,7 @@
 //! Products in the forms of other programs: ISIS, Ames Stereo Pipeline, GIS, catalogues.
 
 pub(super) mod adjusted;
+mod binary_network;
 mod bundleout;
 mod control_network;
 mod gcp;
@@ -15,6 +16,7 @@ pub(super) mod shapefile;
 pub(super) mod stac;
 pub(super) mod tables;
 
+pub use binary_network::write_binary_network;
 pub use control_network::{ControlNetwork, NetworkMeasure, NetworkPoint, write_control_network};
 pub use gcp::{ControlMeasure, ControlPoint, write_gcp};
 pub use lidar_data::{LidarPoint, ProfileShift, isis_serial_number, write_lidar_data};

@@ -55,12 +55,20 @@ pub(super) fn open(path: &Path) -> Result<File> {
 
 /// Writes `text` and checks that the file holds it.
 pub(super) fn write_text(path: &Path, text: &str) -> Result<()> {
-    write_bytes(path, text.as_bytes())?;
-    if read_bytes(path)? == text.as_bytes() {
+    write_checked(path, text.as_bytes())
+}
+
+/// Writes bytes and reads them back.
+///
+/// # Errors
+/// Errors of the disk; bytes that are read back differently.
+pub(super) fn write_checked(path: &Path, bytes: &[u8]) -> Result<()> {
+    write_bytes(path, bytes)?;
+    if read_bytes(path)? == bytes {
         return Ok(());
     }
     Err(ProductError::ReadBack {
-        what: format!("{} bytes of text", text.len()),
+        what: format!("{} bytes", bytes.len()),
     })
     .in_file(path)
 }

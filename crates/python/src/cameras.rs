@@ -1,6 +1,6 @@
 //! Cameras of line scanners by their support data.
 
-use std::sync::Arc;
+use std::{f64::consts::FRAC_PI_2, sync::Arc};
 
 use areograph::{
     body::Body,
@@ -8,7 +8,7 @@ use areograph::{
     frames::{BodyFixed, Position},
     geom::{
         ellipsoid::{Spherical, ray_meets_ellipsoid, spherical_to_xyz_m},
-        pushbroom::Projector,
+        pushbroom::{ExteriorOrientation as _, Projector},
     },
     pds::isd::SupportSource,
     stages::line_camera::LineCamera,
@@ -23,6 +23,12 @@ use super::{
     columns::{Columns, arrays, numbers},
     failures::detached,
 };
+
+/// Largest difference between the radius of a body and that in support data, metres: other bodies differ by far more.
+const RADIUS_M: f64 = 20_000.0;
+
+/// A point that no line sees.
+const UNSEEN: ([f64; 2], bool) = ([f64::NAN; 2], false);
 
 /// An image of a line scanner by its support data (ISD of the Community Sensor Model).
 #[pyclass(frozen, module = "areograph._native")]
@@ -41,9 +47,13 @@ impl Camera {
     fn new(py: Python<'_>, isd: &str) -> PyResult<Self> {
         detached(py, || {
             let source = SupportSource::Text(isd);
-            let target = source.read()?.target;
-            let of_target = |body: &Body| target == Some(i64::from(body.naif().body));
-            let body = [Body::Mars, Body::Moon].into_iter().find(of_target);
+            let support = source.read()?;
+            // Not all programs state the target; radii do, and the reader examines both.
+            let is_target = |body: &Body| match support.target {
+                Some(target) => target == i64::from(body.naif().body),
+                None => (body.model().equatorial_radius_m - support.radii_m[0]).abs() < RADIUS_M,
+            };
+            let body = [Body::Mars, Body::Moon].into_iter().find(is_target);
             let body = body.unwrap_or(Body::Mars);
             let camera = LineCamera::of(SupportSource::Text(isd), "of the support data", body)?;
             Ok(Self { camera, body })
@@ -68,29 +78,37 @@ impl Camera {
         let [longitudes_deg, latitudes_deg, radii_m] =
             arrays(py, names, [longitude_deg, latitude_deg, radius_m])?;
         let camera = &self.camera.camera;
-        let seen = detached(py, || -> Result<Vec<[f64; 2]>> {
+        let seen = detached(py, || -> Result<Vec<([f64; 2], bool)>> {
             let projector = Projector::new(&camera.orientation, camera.lines());
             let Ok(projector) = projector else {
-                return Ok(vec![[f64::NAN; 2]; radii_m.len()]);
+                return Ok(vec![UNSEEN; radii_m.len()]);
             };
             let projector = projector.through(camera.detector.distortion);
             let see = |row: usize| {
                 let [longitude_rad, latitude_rad] =
                     [longitudes_deg[row], latitudes_deg[row]].map(|deg| deg * RADIANS_PER_DEGREE);
+                if latitude_rad.abs() > FRAC_PI_2 || !(radii_m[row] > 0.0) {
+                    return None;
+                }
                 let point_m = spherical_to_xyz_m(longitude_rad, latitude_rad, radii_m[row]);
                 let seen = projector.project(&point_m).ok()?;
+                // A point of the far side lies on a ray of the camera too.
+                let from_m = camera.orientation.pose(seen.x).position_m;
+                if !((from_m - point_m).dot(&point_m) > 0.0) {
+                    return None;
+                }
                 let focal_px = camera.detector.focal_px(&seen.camera_m).ok()?;
                 let line = camera.line_times.line_of_offset(seen.x);
-                Some([line, camera.detector.sample(focal_px.y)])
+                let sample = camera.detector.sample(focal_px.y);
+                let is_shown = camera.shows(line, sample) && !camera.line_times.in_gap(seen.x);
+                Some(([line, sample], is_shown))
             };
             let rows = (0..radii_m.len()).into_par_iter();
-            Ok(rows.map(|row| see(row).unwrap_or([f64::NAN; 2])).collect())
+            Ok(rows.map(|row| see(row).unwrap_or(UNSEEN)).collect())
         })?;
-        let valid = seen
-            .iter()
-            .map(|[line, sample]| camera.shows(*line, *sample));
+        let valid = seen.iter().map(|(_, is_shown)| *is_shown);
         let valid: ArrayRef = Arc::new(valid.map(Some).collect::<BooleanArray>());
-        let column = |of: usize| numbers(seen.iter().map(|pixel| pixel[of]).collect());
+        let column = |of: usize| numbers(seen.iter().map(|(pixel, _)| pixel[of]).collect());
         table([("line", column(0)), ("sample", column(1)), ("valid", valid)])
     }
 
@@ -153,7 +171,6 @@ impl Camera {
         let poses: Vec<[f64; 8]> = lines
             .iter()
             .map(|line| {
-                use areograph::geom::pushbroom::ExteriorOrientation as _;
                 let pose = camera
                     .orientation
                     .pose(camera.line_times.offset_of_line(*line));
@@ -186,5 +203,5 @@ fn meets_sphere(
     let square_m2 = radius_m * radius_m - (from_m.norm_squared() - along_m * along_m);
     let away_m = along_m - square_m2.sqrt();
     // Written so that NaN is rejected too.
-    (away_m > 0.0).then(|| from_m + away_m * direction)
+    (radius_m > 0.0 && away_m > 0.0).then(|| from_m + away_m * direction)
 }

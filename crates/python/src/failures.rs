@@ -88,6 +88,11 @@ pub(crate) fn exception(py: Python<'_>, failure: &Error) -> PyErr {
     attributes.err().unwrap_or(exception)
 }
 
+/// An exception for wrong arguments.
+pub(crate) fn usage(message: impl Into<String>) -> PyErr {
+    UsageError::new_err(message.into())
+}
+
 /// Runs `work` without the lock of the interpreter; it stops early when Python receives a signal that raises.
 ///
 /// # Errors

@@ -5,7 +5,7 @@ use std::{path::PathBuf, sync::Arc};
 use areograph::{
     body::Body,
     config::usual_instrument,
-    error::Result,
+    error::{Cause, Result},
     flow::{Answer, Request, RivalSet, compare_kernels as compare, require_different},
     geom::body_rotation::{body_rotation, spin_rad_s},
     spice::{KernelSet, RequiredCoverage, Session},
@@ -87,13 +87,23 @@ pub(crate) fn spacecraft_states(
     Ok((columns, kernels))
 }
 
-/// Compares kernel sets over an interval of UTC, else over all that they share; the answer is JSON.
+/// An interval of time that ends before it begins.
+#[derive(Debug, thiserror::Error, Cause)]
+#[error("t0 is {first} and t1 is {last}; expected the first earlier than the second")]
+#[cause(Configuration: "exchange t0 and t1")]
+struct Backwards {
+    first: String,
+    last: String,
+}
+
+/// Compares kernel sets over an interval of UTC, else over all that they share: the answer as JSON, and the kernels of each
+/// set.
 #[pyfunction]
 pub(crate) fn compare_kernels(
     py: Python<'_>,
     sets: Vec<(String, Vec<PathBuf>)>,
     utc: Option<[String; 2]>,
-) -> PyResult<String> {
+) -> PyResult<(String, Vec<Vec<(String, String)>>)> {
     interruptible(py, |_| {
         let sets = sets.into_iter().map(|(id, paths)| {
             let kernels = KernelSet::named(&paths)?;
@@ -104,6 +114,9 @@ pub(crate) fn compare_kernels(
         let required = utc.map(|[first, last]| {
             let session = Session::open(&sets[0].kernels)?;
             let span = Interval::new(session.utc_to_et(&first)?, session.utc_to_et(&last)?);
+            if span.start >= span.stop {
+                return Err(Backwards { first, last }.into());
+            }
             let span = Intervals::union_of([span]);
             Ok(RequiredCoverage {
                 attitudes: span.shifted(bias.seconds()),
@@ -123,6 +136,7 @@ pub(crate) fn compare_kernels(
             clocks: false,
         };
         let compared = compare(&sets, &request)?;
-        Ok(json!(Answer::of(&compared)).to_string())
+        let kernels = sets.iter().map(|set| provenance(&set.kernels));
+        Ok((json!(Answer::of(&compared)).to_string(), kernels.collect()))
     })
 }

@@ -31,7 +31,7 @@ mod _native {
         },
         kernels::{compare_kernels, spacecraft_states, utc_to_et},
         ranges::range_residuals,
-        runs::{check, main, plan, run},
+        runs::{check, main, plan, product_id, run},
         shots::{search_shots, shot_columns},
     };
 

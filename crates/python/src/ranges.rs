@@ -13,12 +13,13 @@ use areograph::{
     time::{Et, Interval, Intervals},
     units::RADIANS_PER_DEGREE,
 };
+use nalgebra::Vector3;
 use pyo3::{exceptions::PyValueError, prelude::*};
 use rayon::prelude::*;
 
 use super::{
     columns::{Columns, arrays, numbers},
-    failures::interruptible,
+    failures::{interruptible, usage},
     kernels::provenance,
 };
 
@@ -39,6 +40,16 @@ pub(crate) const RANGE_COLUMNS: [&str; 10] = [
 const MARGIN_S: f64 = 0.5;
 /// The tabulated trajectory stays this close to the kernels, metres: a tenth of a PEDR centimetre.
 const TOLERANCE_M: f64 = 0.001;
+
+/// Largest clock bias, as on the command line, seconds.
+const BIAS_MAX_S: f64 = 10.0;
+/// Residuals of a shot of unknown time.
+const UNKNOWN: RangeResiduals = RangeResiduals {
+    range_minus_distance_m: f64::NAN,
+    range_minus_distance_crossover_m: f64::NAN,
+    decoding_m: f64::NAN,
+    spacecraft_m: Vector3::new(f64::NAN, f64::NAN, f64::NAN),
+};
 
 /// A shot of columns in degrees and metres.
 fn shot(columns: &[Vec<f64>; 10], row: usize) -> Footprint {
@@ -86,9 +97,14 @@ pub(crate) fn range_residuals(
     columns: [Bound<'_, PyAny>; 10],
     kernels: Vec<PathBuf>,
     clock_bias_s: Option<f64>,
-) -> PyResult<(Columns, Vec<(String, String)>)> {
+) -> PyResult<(Columns, Vec<(String, String)>, f64)> {
     let columns = arrays(py, RANGE_COLUMNS, columns.each_ref())?;
     let bias_s = clock_bias_s.unwrap_or(usual_altimeter().clock_bias_s);
+    if !(-BIAS_MAX_S..=BIAS_MAX_S).contains(&bias_s) {
+        return Err(usage(format!(
+            "clock_bias_s is {bias_s}; expected -{BIAS_MAX_S} to {BIAS_MAX_S}"
+        )));
+    }
     let (residuals, kernels) = interruptible(py, |stop| {
         let set = KernelSet::named(&kernels)?;
         let session = Session::open(&set)?;
@@ -101,6 +117,9 @@ pub(crate) fn range_residuals(
         Stopped::check(stop)?;
         let residuals = |row: usize| {
             let at = times[row];
+            if !at.seconds().is_finite() {
+                return Ok((f64::NAN, UNKNOWN));
+            }
             let (position, velocity_m_s) = trajectory.state(at).ok_or(Outside(at))?;
             let spacecraft = SpacecraftState::of(at, &position, &velocity_m_s);
             let shot = shot(&columns, row);
@@ -135,6 +154,7 @@ pub(crate) fn range_residuals(
     Ok((
         columns.map_err(|error| PyValueError::new_err(error.to_string()))?,
         kernels,
+        bias_s,
     ))
 }
 
@@ -146,7 +166,8 @@ struct Outside(Et);
 
 /// Intervals of the shots, padded as far as the kernels go.
 fn pieces(session: &Session, times: &[Et]) -> Result<Intervals> {
-    let mut sorted: Vec<Et> = times.to_vec();
+    let known = times.iter().filter(|at| at.seconds().is_finite());
+    let mut sorted: Vec<Et> = known.copied().collect();
     sorted.sort_by(|a, b| a.seconds().total_cmp(&b.seconds()));
     let pieces = sorted.chunk_by(|a, b| b.since(*a) <= Profile::PAUSE_S);
     let pieces: Vec<Interval> = pieces

@@ -6,18 +6,19 @@ use std::{
 };
 
 use areograph::{
-    config::{Document as _, SiteConfig},
+    config::{Document as _, SiteConfig, built_in_instruments},
     error::Result,
     flow::{
         PUBLISH, RunOptions, Task, check_answer, check_out, check_site, plan_answer, plan_site,
         publish_sites, run_answer, run_site,
     },
+    pds::read_label,
     service::start::set_program,
     store::hashes::HashCache,
 };
 use pyo3::prelude::*;
 
-use super::failures::interruptible;
+use super::failures::{detached, interruptible};
 
 /// Runs the program with the arguments of a command line, and returns its exit code.
 ///
@@ -29,6 +30,14 @@ pub(crate) fn main(py: Python<'_>, arguments: Vec<String>, program: PathBuf) -> 
     // An exit code does not state its number.
     let is_it = |code: &u8| ExitCode::from(*code) == ended;
     (0..=u8::MAX).find(is_it).unwrap_or(1)
+}
+
+/// The identifier of the product that a label describes.
+#[pyfunction]
+pub(crate) fn product_id(py: Python<'_>, label: PathBuf) -> PyResult<Option<String>> {
+    detached(py, || {
+        Ok(read_label(&label, built_in_instruments())?.product_id)
+    })
 }
 
 fn load(site: &Path) -> Result<(SiteConfig, Vec<String>)> {

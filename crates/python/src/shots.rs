@@ -1,6 +1,6 @@
 //! Shots of PEDR files and tables.
 
-use std::{path::PathBuf, sync::atomic::AtomicBool};
+use std::{ops::RangeInclusive, path::PathBuf, sync::atomic::AtomicBool};
 
 use areograph::{
     altimetry::ShotFilter,
@@ -13,12 +13,12 @@ use areograph::{
     time::{Et, Interval},
     units::RADIANS_PER_DEGREE,
 };
-use pyo3::{exceptions::PyValueError, prelude::*};
+use pyo3::prelude::*;
 use serde_json::Value;
 
 use super::{
     columns::Columns,
-    failures::{exception, interruptible},
+    failures::{exception, interruptible, usage},
 };
 
 /// Edges of a window that contains every shot, degrees.
@@ -31,7 +31,7 @@ pub(crate) fn shot_columns() -> Vec<&'static str> {
 }
 
 /// Values of a filter: classes, channels, attitude flags, largest off-nadir angle and season in degrees.
-type FilterValues = (Vec<i16>, Vec<u8>, Vec<u16>, f64, [f64; 2]);
+type FilterValues = (Vec<i64>, Vec<i64>, Vec<i64>, f64, [f64; 2]);
 
 struct Batches(ShotBatches);
 
@@ -62,11 +62,12 @@ pub(crate) fn search_shots(
     check_all: bool,
 ) -> PyResult<(Columns, String)> {
     let windows = windows(&boxes, &polygons).map_err(|failure| exception(py, &failure))?;
-    let filter = filter.map(filter_of);
+    let filter = filter.map(filter_of).transpose()?;
     let time = time_s.map(|ends_s| ends_s.map(Et::from_seconds));
     if time.is_some_and(|[start, stop]| !(start <= stop)) {
-        let message = "the interval of time is empty; expected the first time before the last";
-        return Err(PyValueError::new_err(message));
+        return Err(usage(format!(
+            "t0 and t1 are {time_s:?} seconds past J2000; expected the first time before the last"
+        )));
     }
     let request = ShotRequest {
         paths: &paths,
@@ -109,14 +110,53 @@ fn windows(boxes: &[[f64; 4]], polygons: &[PathBuf]) -> Result<Vec<WindowConfig>
     boxes.chain(polygons).collect()
 }
 
+/// The filter, within the limits of the command line.
+///
+/// # Errors
+/// The first value beyond its limits.
 fn filter_of(
     (classes, channels, attitude_flags, off_nadir_max_deg, season_deg): FilterValues,
-) -> ShotFilter {
-    ShotFilter {
-        classes,
-        channels,
-        attitude_flags,
+) -> PyResult<ShotFilter> {
+    if !(off_nadir_max_deg > 0.0 && off_nadir_max_deg <= ShotFilter::OFF_NADIR_LIMIT_DEG) {
+        return Err(usage(format!(
+            "max_off_nadir_deg is {off_nadir_max_deg}; expected above 0 to {}",
+            ShotFilter::OFF_NADIR_LIMIT_DEG
+        )));
+    }
+    if !season_deg.iter().all(|edge| (0.0..=360.0).contains(edge)) {
+        return Err(usage(format!(
+            "solar_longitude_deg is {season_deg:?}; expected two longitudes from 0 to 360 degrees, such as (330, 30)"
+        )));
+    }
+    let [first, last] = ShotFilter::CHANNELS;
+    let of_channels = i64::from(first)..=i64::from(last);
+    Ok(ShotFilter {
+        classes: codes(
+            "classes",
+            &classes,
+            i64::from(i16::MIN)..=i64::from(i16::MAX),
+        )?,
+        channels: codes("channels", &channels, of_channels)?,
+        attitude_flags: codes("attitude_flags", &attitude_flags, 0..=i64::from(u16::MAX))?,
         off_nadir_max_rad: off_nadir_max_deg * RADIANS_PER_DEGREE,
         solar_longitude_rad: season_deg.map(|degrees| degrees * RADIANS_PER_DEGREE),
-    }
+    })
+}
+
+/// Codes within their limits.
+fn codes<T: TryFrom<i64>>(
+    name: &str,
+    codes: &[i64],
+    within: RangeInclusive<i64>,
+) -> PyResult<Vec<T>> {
+    let code = |code: &i64| {
+        let found = within.contains(code).then(|| T::try_from(*code).ok());
+        found.flatten().ok_or_else(|| {
+            let (first, last) = (within.start(), within.end());
+            usage(format!(
+                "{name} contains {code}; expected {first} to {last}"
+            ))
+        })
+    };
+    codes.iter().map(code).collect()
 }

@@ -64,6 +64,13 @@ def test_image_to_ground_inverts_ground_to_image(mission: Mission) -> None:
             assert numpy.abs(hills(longitude_deg, latitude_deg) - radius_m).max() < 2e-3
     # Exchanged coordinates, and positions outside the image, have no place.
     assert not ag.ground_to_image(isd, latitude_deg, longitude_deg, radius_m)[2].any()
+    # The opposite side of the body lies on the same rays.
+    for hidden in ((longitude_deg + 180.0, -latitude_deg, radius_m), (longitude_deg, 180.0 - latitude_deg, radius_m)):
+        assert not ag.ground_to_image(isd, *hidden)[2].any()
+    masked = numpy.ma.masked_array([longitude_deg[2, 3]] * 2, [False, True])
+    seen = ag.ground_to_image(isd, masked, latitude_deg[2, 3], radius_m[2, 3])
+    assert list(seen[2]) == [True, False]
+    seen[0][~seen[2]] = 0.0  # arrays of their own
     assert numpy.isnan(ag.image_to_ground(isd, [-1.0, lines + 1.0], [5.0, 5.0])[0]).all()
     assert numpy.isnan(ag.image_to_ground(isd, 5.0, 5.0, surface=5e6)[0])
 
@@ -79,6 +86,12 @@ def test_support_data_of_a_label_are_those_of_a_run(mission: Mission) -> None:
         ag.load(label, [path for path in files if path.endswith(".tls")])
     with pytest.raises(ag.UsageError, match="metakernel"):
         ag.load(label)
+    # The identifier is the product; the name of the file is free.
+    copy = mission.out / "my label, 日本.copy.lbl"
+    copy.write_bytes(label.read_bytes())
+    copied = ag.load(copy, mission.kernels)
+    assert {name for name in loaded if loaded[name] != copied[name]} == {"areograph"}
+    assert loaded["image_identifier"] == IMAGE
     # A label with kernels is an image too; its positions have the usual light time.
     poses = [ag.orientation(image, *kernels) for image, *kernels in ((label, mission.kernels), (loaded,))]
     assert poses[0].equals(poses[1])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy
 import pytest
 import spiceypy
@@ -24,8 +26,12 @@ def test_states_are_those_of_cspice(mission: Mission) -> None:
                 assert states["utc"][number].item().rstrip("Z") == utc
     by_utc = ag.spacecraft_state(list(states["utc"].values), mission.kernels)
     assert numpy.abs(by_utc["et"].values - et_s).max() < 1e-3
-    names = [kernel["name"] for kernel in states.attrs["areograph"]["kernels"]]
-    assert "leapseconds.tls" in names
+    times = numpy.array([text.rstrip("Z") for text in states["utc"].values], dtype="datetime64[ms]")
+    for dates in (times, list(times.astype(object))):
+        assert numpy.array_equal(ag.spacecraft_state(dates, mission.kernels)["et"], by_utc["et"])
+    # Attributes that NetCDF holds.
+    stated = json.loads(states.attrs["areograph"])
+    assert "leapseconds.tls" in [kernel["name"] for kernel in stated["kernels"]]
 
 
 def test_differences_of_kernel_sets_are_those_of_their_states(mission: Mission) -> None:
@@ -42,5 +48,9 @@ def test_differences_of_kernel_sets_are_those_of_their_states(mission: Mission) 
     assert apart_m.max() > 1.0
     with pytest.raises(ag.UsageError, match="same kernels"):
         ag.compare_kernels(folder / "nav.tm", folder / "nav.tm")
+    hashes = {kernel["name"]: kernel["blake3"] for kernel in json.loads(compared.attrs["areograph"])["kernels"]["b"]}
+    assert len(hashes["mgs_gsfc_scene.bsp"]) == 64
+    with pytest.raises(ag.UsageError, match="earlier than the second"):
+        ag.compare_kernels(folder / "nav.tm", folder / "gsfc.tm", t0=ends[1], t1=ends[0])
     with pytest.raises(ag.UsageError, match="only one"):
         ag.compare_kernels(folder / "nav.tm", folder / "gsfc.tm", t0=ends[0])

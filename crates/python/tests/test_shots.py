@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import json
 import signal
 import struct
@@ -11,6 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import geopandas
 import numpy
 import pandas
 import pyarrow
@@ -23,6 +25,7 @@ from conftest import Mission, areograph, cspice
 import areograph as ag
 
 BOX = (175.0, 176.0, -16.0, -13.0)
+AREA = geopandas.GeoSeries([shapely.box(BOX[0], BOX[2], BOX[1], BOX[3])])
 
 
 def statement_of(table: pyarrow.Table) -> dict[str, Any]:
@@ -100,6 +103,26 @@ def test_tracks_hold_every_shot_once(mission: Mission) -> None:
         assert numpy.array_equal(numpy.array(track.geometry.coords), points)
 
 
+def test_tracks_are_divided_at_the_antimeridian_and_at_gaps(mission: Mission) -> None:
+    whole = ag.tracks(mission.pedr, (-180.0, 180.0, -20.0, 20.0))
+    lines = whole.geometry.explode()
+    assert (numpy.abs(shapely.get_coordinates(lines)[:, 0]) <= 180.0).all()
+    # Degrees: the ground track moves by less than a degree of longitude between shots here.
+    for line in lines[lines.geom_type == "LineString"]:
+        assert numpy.abs(numpy.diff(numpy.array(line.coords)[:, 0])).max() < 1.0
+    two = shapely.MultiPolygon([shapely.box(170, -16, 178, -15), shapely.box(170, -14, 178, -13)])
+    apart = ag.tracks(mission.pedr, two)
+    assert len(apart) > 0
+    # Degrees: the margin of the window of the joined shots.
+    assert apart.geometry.within(two.buffer(0.02)).all()
+    none = ag.tracks(mission.pedr, (10.0, 11.0, 80.0, 81.0))
+    assert len(none) == 0 and list(none.dtypes) == list(apart.dtypes) and none.crs == apart.crs
+
+
+def test_areas_with_the_reference_system_of_shots_are_areas(mission: Mission) -> None:
+    assert len(ag.search_shots(mission.pedr, AREA.set_crs("IAU_2015:49900"))) == len(ag.search_shots(mission.pedr, BOX))
+
+
 def test_ranges_are_those_of_a_run(mission: Mission) -> None:
     result = mission.gusev
     checked = ag.check_ranges(result.footprints, mission.kernels)
@@ -111,6 +134,12 @@ def test_ranges_are_those_of_a_run(mission: Mission) -> None:
     # The bias moves the spacecraft by 0.117 s of its motion relative to the ground.
     unbiased = ag.check_ranges(result.footprints, mission.kernels, clock_bias_s=0.0)
     assert (unbiased["distance_m"] - checked["distance_m"]).abs().max() > 0.05
+    assert checked.attrs["areograph"]["clock_bias_s"] == 0.117
+    unknown = result.footprints.copy()
+    unknown.loc[unknown.index[3], "et_tag_s"] = numpy.nan
+    partly = ag.check_ranges(unknown, mission.kernels)
+    assert partly.isna().all(axis=1).sum() == 1
+    pandas.testing.assert_frame_equal(partly.drop(unknown.index[3]), checked.drop(unknown.index[3]))
     table = ag.read_pedr(mission.pedr, columns=["et_tag_s", "range_m"])
     with pytest.raises(ag.UsageError, match="no column longitude_deg"):
         ag.check_ranges(table, mission.kernels)
@@ -147,7 +176,21 @@ def test_kernels_of_another_package_stay_loaded(mission: Mission) -> None:
         (lambda m: ag.search_shots(m.pedr, (1, 2, 3)), ag.UsageError, "west, east, south, north"),
         (lambda m: ag.search_shots(m.pedr, (0, 1, 5, -5)), ag.UsageError, "south below north"),
         (lambda m: ag.search_shots(m.pedr, t0="1999-01-01"), ag.UsageError, "leap_seconds"),
-        (lambda m: ag.search_shots(m.pedr, t0=2.0, t1=1.0), ValueError, "empty"),
+        (lambda m: ag.search_shots(m.pedr, t0=2.0, t1=1.0), ag.UsageError, "first time before the last"),
+        (lambda m: ag.search_shots(m.pedr, t0=float("nan")), ag.UsageError, "first time before the last"),
+        (lambda m: ag.search_shots(m.pedr, t0=datetime.datetime(1999, 1, 1)), ag.UsageError, "leap_seconds"),
+        (lambda m: ag.search_shots(m.pedr, shapely.Point(0, 0)), ag.UsageError, "a Point; expected polygons"),
+        (lambda m: ag.search_shots(m.pedr, geopandas.GeoSeries([])), ag.UsageError, "no geometry"),
+        (lambda m: ag.search_shots(m.pedr, AREA.set_crs("EPSG:4326")), ag.UsageError, "IAU_2015:49900"),
+        (lambda m: ag.search_shots(m.pedr, AREA.set_crs("IAU_2015:49901")), ag.UsageError, "IAU_2015:49900"),
+        (lambda m: ag.search_shots(m.pedr, solar_longitude_deg=(float("nan"), 1)), ag.UsageError, "0 to 360"),
+        (lambda m: ag.search_shots(m.pedr, max_off_nadir_deg=-1.0), ag.UsageError, "above 0"),
+        (lambda m: ag.search_shots(m.pedr, channels=(300,)), ag.UsageError, "1 to 4"),
+        (lambda m: ag.read_pedr(m.pedr, columns=[]), ag.UsageError, "no columns"),
+        (lambda m: ag.read_pedr(m.pedr, orbits=[-1]), ag.UsageError, "orbit numbers"),
+        (lambda m: ag.check_ranges(ag.read_pedr(m.pedr), m.kernels, clock_bias_s=99.0), ag.UsageError, "-10 to 10"),
+        (lambda m: ag.spacecraft_state([float("nan")], m.kernels), ag.UsageError, r"et\[0\] is nan"),
+        (lambda m: ag.spacecraft_state([0.0], m.kernels.parent), ag.UsageError, "folder"),
         (lambda m: ag.check_ranges(ag.search_shots(m.pedr, BOX), m.folder / "no.tm"), ag.FileAccessError, "no.tm"),
         (lambda m: ag.spacecraft_state([0.0], m.kernels), ag.CoverageError, "-94"),
         (lambda m: ag.spacecraft_state([0.0], m.kernels, frame="MARS"), ag.UsageError, "IAU_MARS"),
@@ -158,10 +201,10 @@ def test_failures_are_exceptions_by_kind(
 ) -> None:
     with pytest.raises(kind, match=text) as raised:
         call(mission)
-    if isinstance(raised.value, ag.AreographError) and hasattr(raised.value, "advice"):
-        codes = {ag.UsageError: 2, ag.InputError: 3, ag.CoverageError: 4, ag.FileAccessError: 6}
-        assert raised.value.exit_code == codes[type(raised.value)]
-        assert raised.value.advice
+    assert isinstance(raised.value, ag.AreographError)
+    codes = {ag.UsageError: 2, ag.InputError: 3, ag.CoverageError: 4, ag.FileAccessError: 6}
+    assert raised.value.exit_code == codes[type(raised.value)]
+    assert isinstance(raised.value.advice, str) and raised.value.site is None
 
 
 def test_damage_is_never_left_out_in_silence(mission: Mission, tmp_path: Path) -> None:

@@ -7,35 +7,29 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Gathered, TieError, TieFile, finite, sigmas};
-use crate::label::{Entry, parse_whole};
+use super::{Gathered, TieFile, finite, sigmas};
+use crate::label::{Entry, Label};
 use areograph_base::{
     frames::Position,
     ties::{KnownGround, TieMeasure},
 };
 
-pub(super) fn parse_network(bytes: &[u8]) -> std::result::Result<TieFile, TieError> {
-    let label = parse_whole(bytes)?;
-    let is_in = |name: &str| label.entries.iter().any(|entry| entry.group == name);
-    if !is_in("CONTROLNETWORK") {
-        // The label of the binary form states where its bytes start.
-        return Err(if is_in("PROTOBUFFER") || is_in("CORE") {
-            TieError::Binary
-        } else {
-            TieError::NoNetwork
-        });
-    }
+/// Complaint about a point without identifier.
+pub(super) const WITHOUT_ID: &str = "a point without PointId";
+
+/// The network of the label that `label` is.
+pub(super) fn parse_text_network(label: &Label) -> TieFile {
     let mut gathered = Gathered::default();
     let mut point = Point::default();
     for block in label.entries.chunk_by(|a, b| a.block == b.block) {
         let block = BlockEntries(block);
         match block.0[0].group.as_str() {
             "CONTROLPOINT" => point = Point::of(block, &mut gathered),
-            "CONTROLMEASURE" => add_measure(&mut gathered, &point, &block),
+            "CONTROLMEASURE" => add_block(&mut gathered, &point, &block),
             _ => {}
         }
     }
-    Ok(gathered.file)
+    gathered.file
 }
 
 /// The entries of one object or group.
@@ -75,9 +69,13 @@ impl<'a> Point<'a> {
         let (id, ignored) = (block.value("POINTID"), block.ignored());
         gathered.file.ignored += usize::from(ignored);
         if id.is_none() {
-            gathered.complain(block.number(), "a point without PointId".to_owned());
+            gathered.complain(block.number(), WITHOUT_ID.to_owned());
         }
-        let known = if ignored { Ok(None) } else { known(&block) };
+        let known = if ignored {
+            Ok(None)
+        } else {
+            known(&coordinates(&block))
+        };
         Self {
             id,
             ignored,
@@ -90,27 +88,48 @@ impl<'a> Point<'a> {
     }
 }
 
+/// Coordinates of a point as a network states them.
+pub(super) struct Coordinates<'a> {
+    /// Type of the point.
+    pub(super) kind: &'a str,
+    /// Finite a priori coordinates.
+    pub(super) xyz_m: [Option<f64>; 3],
+    /// The a priori covariance, if it is numbers, and as written.
+    pub(super) covariance: Option<(Option<Vec<f64>>, String)>,
+}
+
+fn coordinates<'a>(block: &BlockEntries<'a>) -> Coordinates<'a> {
+    let covariance = block.value("APRIORICOVARIANCEMATRIX").map(|text| {
+        let numbers = text.split(',').map(|number| finite(number.trim()));
+        (numbers.collect(), text.to_owned())
+    });
+    Coordinates {
+        kind: block.value("POINTTYPE").unwrap_or_default(),
+        xyz_m: ["APRIORIX", "APRIORIY", "APRIORIZ"].map(|key| block.finite(key)),
+        covariance,
+    }
+}
+
 /// Ground coordinates of a fixed or constrained point; coordinates of a free point are initial values of its last
 /// adjustment.
 ///
 /// # Errors
 /// The missing value of such a point, which then becomes free.
-fn known(block: &BlockEntries<'_>) -> std::result::Result<Option<KnownGround>, String> {
-    let kind = block.value("POINTTYPE").unwrap_or_default();
+pub(super) fn known(of: &Coordinates<'_>) -> std::result::Result<Option<KnownGround>, String> {
+    let kind = of.kind;
     let is = |word: &str| kind.eq_ignore_ascii_case(word);
     let fixed = is("Fixed") || is("Ground");
     if !fixed && !is("Constrained") {
         return Ok(None);
     }
-    let coordinates = ["APRIORIX", "APRIORIY", "APRIORIZ"].map(|key| block.finite(key));
-    let [Some(x_m), Some(y_m), Some(z_m)] = coordinates else {
+    let [Some(x_m), Some(y_m), Some(z_m)] = of.xyz_m else {
         return Err(format!(
             "its type is {kind}, but AprioriX, AprioriY and AprioriZ are not three numbers; the point is treated as free"
         ));
     };
-    let covariance_m2 = match (fixed, block.value("APRIORICOVARIANCEMATRIX")) {
+    let covariance_m2 = match (fixed, &of.covariance) {
         (true, _) => None,
-        (false, Some(text)) => Some(covariance_m2(text)?),
+        (false, Some((numbers, text))) => Some(covariance_m2(numbers.as_deref(), text)?),
         (false, None) => {
             return Err(
                 "its type is Constrained, but it has no AprioriCovarianceMatrix; the point is treated as free"
@@ -124,13 +143,9 @@ fn known(block: &BlockEntries<'_>) -> std::result::Result<Option<KnownGround>, S
     }))
 }
 
-/// The covariance whose upper triangle is in `text`, row by row.
-fn covariance_m2(text: &str) -> std::result::Result<Matrix3<f64>, String> {
-    let numbers: Option<Vec<f64>> = text
-        .split(',')
-        .map(|number| finite(number.trim()))
-        .collect();
-    let matrix = match numbers.as_deref() {
+/// The covariance with this upper triangle, row by row; `text` is its form in the file.
+fn covariance_m2(numbers: Option<&[f64]>, text: &str) -> std::result::Result<Matrix3<f64>, String> {
+    let matrix = match numbers {
         Some(&[xx, xy, xz, yy, yz, zz]) => Some(Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)),
         _ => None,
     };
@@ -144,7 +159,7 @@ fn covariance_m2(text: &str) -> std::result::Result<Matrix3<f64>, String> {
         })
 }
 
-fn add_measure(gathered: &mut Gathered, point: &Point<'_>, measure: &BlockEntries<'_>) {
+fn add_block(gathered: &mut Gathered, point: &Point<'_>, measure: &BlockEntries<'_>) {
     if point.ignored || measure.ignored() {
         gathered.file.ignored += usize::from(measure.ignored());
         return;
@@ -152,15 +167,39 @@ fn add_measure(gathered: &mut Gathered, point: &Point<'_>, measure: &BlockEntrie
     let Some(id) = point.id else {
         return;
     };
-    let place = (
-        measure.value("SERIALNUMBER"),
-        measure.finite("LINE"),
-        measure.finite("SAMPLE"),
-    );
-    let written = ["LINESIGMA", "SAMPLESIGMA"].map(|key| measure.value(key));
-    if let (Some(image), Some(line), Some(sample)) = place {
-        let sigma_px = sigmas(written).unwrap_or_else(|text| {
-            gathered.complain(measure.number(), format!("point {id}: {text}"));
+    let measured = Measured {
+        image: measure.value("SERIALNUMBER"),
+        line: measure.value("LINE"),
+        sample: measure.value("SAMPLE"),
+        sigmas: ["LINESIGMA", "SAMPLESIGMA"].map(|key| measure.value(key)),
+    };
+    add_measure(gathered, measure.number(), id, point.known, &measured);
+}
+
+/// A measure as written.
+pub(super) struct Measured<'a> {
+    /// Serial number.
+    pub(super) image: Option<&'a str>,
+    /// Line.
+    pub(super) line: Option<&'a str>,
+    /// Sample.
+    pub(super) sample: Option<&'a str>,
+    /// Standard deviations of line and sample.
+    pub(super) sigmas: [Option<&'a str>; 2],
+}
+
+/// Adds a measure of the point `id`, or a complaint about it.
+pub(super) fn add_measure(
+    gathered: &mut Gathered,
+    record: u64,
+    id: &str,
+    known: Option<KnownGround>,
+    measured: &Measured<'_>,
+) {
+    let [line, sample] = [measured.line, measured.sample].map(|text| finite(text?));
+    if let (Some(image), Some(line), Some(sample)) = (measured.image, line, sample) {
+        let sigma_px = sigmas(measured.sigmas).unwrap_or_else(|text| {
+            gathered.complain(record, format!("point {id}: {text}"));
             None
         });
         let measure = TieMeasure {
@@ -169,23 +208,23 @@ fn add_measure(gathered: &mut Gathered, point: &Point<'_>, measure: &BlockEntrie
             sample,
             sigma_px,
         };
-        gathered.add(id.to_owned(), point.known, measure);
+        gathered.add(id.to_owned(), known, measure);
     } else {
-        let found = |key| measure.value(key).unwrap_or("missing");
+        let found = |value: Option<&str>| value.unwrap_or("missing").to_owned();
         let text = format!(
             "point {id}: SerialNumber {}, Line {}, Sample {}: expected a name and two numbers",
-            found("SERIALNUMBER"),
-            found("LINE"),
-            found("SAMPLE")
+            found(measured.image),
+            found(measured.line),
+            found(measured.sample)
         );
-        gathered.complain(measure.number(), text);
+        gathered.complain(record, text);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ties::tests::measure;
+    use crate::ties::{TieError, parse_network, tests::measure};
 
     const NETWORK: &str = "Object = ControlNetwork\n NetworkId = n\n \
         Object = ControlPoint\n PointId = p1\n \
@@ -282,7 +321,8 @@ mod tests {
     #[test]
     fn what_is_no_network_is_refused() {
         let binary = b"Object = ProtoBuffer\n Object = Core\n HeaderStartByte = 65536\n End_Object\nEnd_Object\nEnd\n\0\x01";
-        assert_eq!(parse_network(binary), Err(TieError::Binary));
+        let missing = parse_network(binary).unwrap_err().to_string();
+        assert!(missing.starts_with("HEADERBYTES of the label"), "{missing}");
         assert_eq!(parse_network(b"A = 1\n"), Err(TieError::NoNetwork));
         assert!(matches!(parse_network(b"\x00"), Err(TieError::Label(_))));
     }

@@ -20,7 +20,7 @@ use areograph_base::{
 };
 
 /// The outer edge of the first pixel is 0 here; ISIS has its middle at 1.
-const EDGE_TO_ISIS: f64 = 0.5;
+pub(super) const EDGE_TO_ISIS: f64 = 0.5;
 
 /// A network with its header.
 #[derive(Debug, Clone, PartialEq)]
@@ -78,27 +78,27 @@ pub fn write_control_network(path: &Path, network: &ControlNetwork) -> Result<u6
 
 /// Lines of nested objects, two blanks deeper in each.
 #[derive(Default)]
-struct Lines {
-    text: String,
+pub(super) struct Lines {
+    pub(super) text: String,
     depth: usize,
 }
 
 impl Lines {
-    fn line(&mut self, line: &str) {
+    pub(super) fn line(&mut self, line: &str) {
         let indent = 2 * self.depth;
         let _infallible = writeln!(self.text, "{:indent$}{line}", "");
     }
 
-    fn key(&mut self, key: &str, value: &str) {
+    pub(super) fn key(&mut self, key: &str, value: &str) {
         self.line(&format!("{key} = {value}"));
     }
 
-    fn open(&mut self, kind: &str, name: &str) {
+    pub(super) fn open(&mut self, kind: &str, name: &str) {
         self.key(kind, name);
         self.depth += 1;
     }
 
-    fn close(&mut self, end: &str) {
+    pub(super) fn close(&mut self, end: &str) {
         self.depth -= 1;
         self.line(end);
     }
@@ -143,7 +143,7 @@ impl Lines {
     }
 }
 
-fn refused(reason: String) -> ProductError {
+pub(super) fn refused(reason: String) -> ProductError {
     ProductError::Refused {
         action: "write a control network",
         reason,
@@ -151,7 +151,7 @@ fn refused(reason: String) -> ProductError {
 }
 
 /// A text in the kind of quotes that it does not contain.
-fn quoted(text: &str) -> std::result::Result<String, ProductError> {
+pub(super) fn quoted(text: &str) -> std::result::Result<String, ProductError> {
     let quote = ['"', '\''].into_iter().find(|quote| !text.contains(*quote));
     match quote.filter(|_| !text.contains(char::is_control)) {
         Some(quote) => Ok(format!("{quote}{text}{quote}")),

@@ -6,8 +6,11 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::{
     adjusted::{adjusted, isis_name, shared_sigma_m, tie_sigmas_px},
+    binary_network::write_binary_network,
     bundleout::{ImageRow, PointRow, ResidualRow, write_images, write_points, write_residuals},
-    control_network::{ControlNetwork, NetworkMeasure, NetworkPoint, write_control_network},
+    control_network::{
+        ControlNetwork, EDGE_TO_ISIS, NetworkMeasure, NetworkPoint, write_control_network,
+    },
     points::{ImageMeasure, shared_in_words},
 };
 use crate::{
@@ -21,9 +24,6 @@ use areograph_stages::{
     intersect::IntersectedPoint,
 };
 
-/// The outer edge of the first pixel is 0 here; ISIS has its middle at 1.
-const EDGE_TO_ISIS: f64 = 0.5;
-
 pub(crate) static NETWORK: Declaration = Declaration {
     path: "exchange/adjusted.pvl",
     what: "control network with adjusted points, covariances and residuals, as text",
@@ -36,9 +36,24 @@ pub(crate) static NETWORK: Declaration = Declaration {
         let network = joined.network();
         write_control_network(path, &network).map(Some)
     }),
+    uses: &[],
+};
+
+pub(crate) static BINARY_NETWORK: Declaration = Declaration {
+    path: "exchange/adjusted.net",
+    what: "control network with adjusted points, covariances and residuals, binary",
+    readers: "ISIS",
+    rows: "tie points",
+    role: Role::Data,
+    content: Content::Foreign,
+    write: Write::Adjustment(|path, of, geometric, adjustment| {
+        let joined = Joined::new(of.site, geometric, adjustment);
+        let network = joined.network();
+        write_binary_network(path, &network).map(Some)
+    }),
     uses: &[Use {
         program: Program::Isis,
-        lines: "cnetpvl2bin from=adjusted.pvl to=adjusted.net",
+        lines: "cnetstats fromlist=cubes.lis cnet=adjusted.net",
     }],
 };
 

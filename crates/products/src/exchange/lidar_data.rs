@@ -17,7 +17,10 @@ use std::{collections::BTreeSet, path::Path};
 use nalgebra::Matrix3;
 use serde::Serialize;
 
-use super::points::{GroundEstimate, ImageMeasure, above_zero};
+use super::{
+    control_network::EDGE_TO_ISIS,
+    points::{GroundEstimate, ImageMeasure, above_zero},
+};
 use crate::{error::ProductError, files::write_json};
 use areograph_base::{
     error::{Locate, Result},
@@ -25,9 +28,6 @@ use areograph_base::{
     units::{METRES_PER_KM, RADIANS_PER_DEGREE},
 };
 use areograph_stages::tag_times::ImageTimes;
-
-/// The outer edge of the first pixel is 0 here; ISIS has its middle at 1.
-const EDGE_TO_ISIS: f64 = 0.5;
 
 /// A shot whose range constrains the images that were exposed at the time.
 #[derive(Debug, Clone, PartialEq)]

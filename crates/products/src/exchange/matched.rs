@@ -2,6 +2,7 @@
 
 use super::{
     adjusted::isis_name,
+    binary_network::write_binary_network,
     control_network::{ControlNetwork, NetworkMeasure, NetworkPoint, write_control_network},
     points::ImageMeasure,
 };
@@ -50,9 +51,23 @@ pub(crate) static NETWORK: Declaration = Declaration {
         let serials = serials(of.site);
         write_control_network(path, &network(of.site, geometric, &serials))
     }),
+    uses: &[],
+};
+
+pub(crate) static BINARY_NETWORK: Declaration = Declaration {
+    path: "exchange/matched_ties.net",
+    what: "matched tie points as a control network, binary",
+    readers: "ISIS",
+    rows: "tie points",
+    role: Role::Data,
+    content: Content::Foreign,
+    write: Write::Matched(|path, of, geometric| {
+        let serials = serials(of.site);
+        write_binary_network(path, &network(of.site, geometric, &serials))
+    }),
     uses: &[Use {
         program: Program::Isis,
-        lines: "cnetpvl2bin from=matched_ties.pvl to=matched_ties.net",
+        lines: "cnetstats fromlist=cubes.lis cnet=matched_ties.net",
     }],
 };
 

@@ -13,8 +13,8 @@ import numpy
 import pyarrow
 
 from . import _native
-from ._common import Paths, StrPath, column, optional, paths_of, provenance
-from .errors import InputError, InvalidProducts, UsageError
+from ._common import Paths, StrPath, column, optional, paths_of, provenance_text
+from .errors import AreographError, InputError, InvalidProducts, UsageError
 from .results import open_result
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def load(label: StrPath, kernels: Paths | None = None, *, format: str = "isd") -
     -------
     dict
         Support data as ``usgscsm`` reads them, the file ``isd.json`` of a run. They state the pointing bias and the
-        light-time convention; see the guide for the differences from ALE.
+        light-time convention; see the guide for the differences from ALE. The identifier is the product of the label.
 
     Raises
     ------
@@ -60,6 +60,8 @@ def load(label: StrPath, kernels: Paths | None = None, *, format: str = "isd") -
     if kernels is None:
         raise UsageError("no kernels; expected a metakernel, a folder, or kernels in load order")
     files = [os.path.abspath(path) for path in paths_of(kernels)]
+    if not files:
+        raise UsageError("no kernels; expected a metakernel, a folder, or kernels in load order")
     if len(files) == 1 and os.path.isdir(files[0]):
         source = f"root = {_text(files[0])}"
     elif len(files) == 1 and files[0].lower().endswith(".tm"):
@@ -69,15 +71,20 @@ def load(label: StrPath, kernels: Paths | None = None, *, format: str = "isd") -
     path = os.path.abspath(label)
     if not os.path.isfile(path):
         raise InputError(f"{path}: no such file; expected the label of an image")
-    # Identifiers of images have letters, digits, points, hyphens and underscores.
-    name = re.sub(r"[^A-Za-z0-9._-]", "-", os.path.splitext(os.path.basename(path))[0])
+    name = _identifier(_native.product_id(path) or os.path.splitext(os.path.basename(path))[0])
     with tempfile.TemporaryDirectory() as folder:
         site, out = os.path.join(folder, "site.toml"), os.path.join(folder, "out")
         with open(site, "w", encoding="utf-8") as file:
             file.write(f'site = "image"\n[kernels]\n{source}\n')
             file.write(f"[[images]]\nid = {_text(name)}\nlabel = {_text(path)}\n")
         # Its remarks concern the missing shots.
-        _native.run(site, out, False, None)
+        try:
+            _native.run(site, out, False, None)
+        except AreographError as error:
+            # The site and its stages are those of this function alone.
+            error.args = (re.sub(r"^image/[^:]*: ", "", str(error)),)
+            error.site = error.stage = None
+            raise
         result = open_result(os.path.join(out, "image"))
         if not result.valid:
             raise InvalidProducts(f"{path}: {'; '.join(result.reasons)}")
@@ -126,7 +133,7 @@ def orientation(image: Image, kernels: Paths | None = None, *, step_lines: float
             "xyz": ["x", "y", "z"],
             "wxyz": ["w", "x", "y", "z"],
         },
-        attrs=provenance(image=isd.get("image_identifier"), support=isd.get("areograph")),
+        attrs=provenance_text(image=isd.get("image_identifier"), support=isd.get("areograph")),
     )
     return dataset
 
@@ -148,13 +155,13 @@ def ground_to_image(
     -------
     line, sample, valid
         Lines and samples are 0 at the outer edge of the first line or sample. ``valid`` states whether the image shows
-        the point; a point that no line sees has NaN.
+        the point. A point that no line sees has NaN: behind the camera, on the far side of the body, or without a
+        position. Terrain in between is not examined.
     """
-    points = numpy.broadcast_arrays(longitude_deg, latitude_deg, radius_m)
-    table = pyarrow.table(_camera(_support(image)).project(*(column(values) for values in points)))
-    shape = points[0].shape
+    points, shape = _broadcast(longitude_deg=longitude_deg, latitude_deg=latitude_deg, radius_m=radius_m)
+    table = pyarrow.table(_camera(_support(image)).project(*points))
     line, sample, valid = (
-        table[name].to_numpy().reshape(shape) for name in ("line", "sample", "valid")
+        numpy.array(table[name].to_numpy()).reshape(shape) for name in ("line", "sample", "valid")
     )
     return line, sample, valid
 
@@ -175,8 +182,8 @@ def image_to_ground(
     line, sample
         Positions, 0 at the outer edge of the first line or sample; numbers or arrays of one shape.
     surface
-        The ground: a radius in metres, or a function that returns radii in metres at arrays of longitudes and latitudes in
-        degrees. By default the ellipsoid of the body.
+        The ground: a radius in metres, or a function that returns radii in metres at arrays of longitudes (0 to 360) and
+        latitudes in degrees, which are NaN for positions outside the image. By default the ellipsoid of the body.
 
     Returns
     -------
@@ -184,16 +191,18 @@ def image_to_ground(
         NaN where the position is outside the image, a ray meets no ground, or the iteration over ``surface`` does not
         converge to 1 mm. Support data state no accuracy: for standard deviations use the products of an adjustment.
     """
-    positions = numpy.broadcast_arrays(line, sample)
-    shape = positions[0].shape
-    camera, pixels = _camera(_support(image)), (column(positions[0]), column(positions[1]))
+    (lines, samples), shape = _broadcast(line=line, sample=sample)
+    camera, pixels = _camera(_support(image)), (lines, samples)
     if surface is None:
         ground = _ground(camera.intersect(*pixels))
     elif callable(surface):
         ground = _on_surface(camera, pixels, surface)
     else:
-        radius_m = numpy.full(pixels[0].shape, float(surface))
-        ground = _ground(camera.intersect(*pixels, radius_m))
+        radii_m = column(surface, "surface")
+        if len(radii_m) != 1:
+            raise UsageError("surface is an array; expected a radius, or a function of longitude and latitude")
+        spheres_m = numpy.full(pixels[0].shape, radii_m[0])
+        ground = _ground(camera.intersect(*pixels, spheres_m))
     longitude_deg, latitude_deg, radius_m = (values.reshape(shape) for values in ground)
     return longitude_deg, latitude_deg, radius_m
 
@@ -204,7 +213,10 @@ def _on_surface(
     longitude_deg, latitude_deg, radius_m = _ground(camera.intersect(*pixels))
     change_m = numpy.full(radius_m.shape, numpy.inf)
     for _ in range(_ITERATIONS):
-        surface_m = column(surface(longitude_deg, latitude_deg))
+        radii_m = column(surface(longitude_deg, latitude_deg), "the result of surface")
+        if len(radii_m) not in (1, len(radius_m)):
+            raise UsageError(f"surface returned {len(radii_m)} radii for {len(radius_m)} places; expected as many")
+        surface_m = numpy.ascontiguousarray(numpy.broadcast_to(radii_m, radius_m.shape))
         # A place outside the surface keeps NaN from here on.
         change_m = numpy.abs(surface_m - radius_m)
         longitude_deg, latitude_deg, radius_m = _ground(camera.intersect(*pixels, surface_m))
@@ -216,7 +228,18 @@ def _on_surface(
 
 def _ground(columns: _native.Columns) -> list[Numbers]:
     table = pyarrow.table(columns)
-    return [table[name].to_numpy() for name in ("longitude_deg", "latitude_deg", "radius_m")]
+    return [numpy.array(table[name].to_numpy()) for name in ("longitude_deg", "latitude_deg", "radius_m")]
+
+
+def _broadcast(**values: Any) -> tuple[list[Numbers], tuple[int, ...]]:
+    """Return numbers as columns of equal length, and their common shape."""
+    arrays = {name: numpy.ma.asanyarray(of) if numpy.ma.isMaskedArray(of) else of for name, of in values.items()}
+    shape = numpy.broadcast_shapes(*(numpy.shape(of) for of in arrays.values()))
+    columns = []
+    for name, of in arrays.items():
+        numbers = column(of, name).reshape(numpy.shape(of))
+        columns.append(numpy.ascontiguousarray(numpy.broadcast_to(numbers, shape)).reshape(-1))
+    return columns, shape
 
 
 def _support(image: Image) -> dict[str, Any]:
@@ -234,7 +257,13 @@ def _support(image: Image) -> dict[str, Any]:
 
 
 def _camera(isd: dict[str, Any]) -> _native.Camera:
-    return _native.Camera(json.dumps(isd))
+    # NumPy's numbers are numbers too.
+    return _native.Camera(json.dumps(isd, default=lambda value: value.item()))
+
+
+def _identifier(name: str) -> str:
+    """Return a name as an identifier of images: 1 to 64 letters, digits, `_` or `-`."""
+    return re.sub(r"[^A-Za-z0-9_-]", "-", name)[:64] or "image"
 
 
 def _text(path: str) -> str:

@@ -1,4 +1,7 @@
-"""Exceptions by kind of failure; the message states site, stage, file, value and what to do."""
+"""Exceptions by kind of failure; the message states site, stage, file, value and what to do.
+
+Every exception has the attributes ``exit_code`` (as of the command), ``site``, ``stage``, ``file`` and ``advice``.
+"""
 
 from ._native import (
     AreographError,
@@ -19,3 +22,11 @@ __all__ = [
     "InvalidProducts",
     "UsageError",
 ]
+
+# Values of exceptions that are raised in Python.
+AreographError.site = AreographError.stage = AreographError.file = None
+AreographError.advice = ""
+for _code, _kind in enumerate(
+    (InternalError, UsageError, InputError, CoverageError, InvalidProducts, FileAccessError), start=1
+):
+    _kind.exit_code = _code

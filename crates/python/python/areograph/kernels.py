@@ -10,7 +10,7 @@ import numpy
 import pyarrow
 
 from . import _native
-from ._common import Paths, column, kernels_of, optional, paths_of, provenance
+from ._common import Paths, column, kernels_at, kernels_of, optional, provenance_text, utc_text
 from .errors import UsageError
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ def spacecraft_state(et: Any, kernels: Paths, *, frame: str = "IAU_MARS") -> Dat
     Parameters
     ----------
     et
-        TDB seconds past J2000, or UTC as text: one or an array.
+        TDB seconds past J2000, or UTC as text or datetime: one or an array.
     kernels
         A metakernel (``.tm``), or kernels in load order.
     frame
@@ -45,11 +45,12 @@ def spacecraft_state(et: Any, kernels: Paths, *, frame: str = "IAU_MARS") -> Dat
     """
     if frame not in _FRAMES:
         raise UsageError(f"frame is {frame!r}; expected one of {', '.join(_FRAMES)}")
-    xarray, files = optional("xarray", "xarray"), paths_of(kernels)
-    times = [et] if isinstance(et, str) else et
-    if isinstance(times, Iterable) and all(isinstance(time, str) for time in times):
-        times = _native.utc_to_et(list(times), files)
-    et_s = column(times)
+    xarray, files = optional("xarray", "xarray"), kernels_at(kernels)
+    texts = _utc_texts(et)
+    et_s = column(et, "et") if texts is None else column(_native.utc_to_et(texts, files))
+    if not numpy.all(numpy.isfinite(et_s)):
+        row = int(numpy.flatnonzero(~numpy.isfinite(et_s))[0])
+        raise UsageError(f"et[{row}] is {et_s[row]}; expected finite seconds past J2000")
     states, used = _native.spacecraft_states(et_s, files, _FRAMES[frame])
     table = pyarrow.table(states)
 
@@ -67,7 +68,7 @@ def spacecraft_state(et: Any, kernels: Paths, *, frame: str = "IAU_MARS") -> Dat
             "utc": ("et", table["utc"].to_numpy(zero_copy_only=False)),
             "xyz": ["x", "y", "z"],
         },
-        attrs={"frame": frame, **provenance(kernels=kernels_of(used))},
+        attrs={"frame": frame, **provenance_text(kernels=kernels_of(used))},
     )
     return dataset
 
@@ -90,7 +91,7 @@ def compare_kernels(
         ``position_m`` with dimensions ``set``, ``et`` and ``axis`` (radial, along-track, cross-track of the mean
         orbit); where the sets contain attitudes, ``attitude_arcsec`` with dimensions ``set``, ``et_attitude`` and
         ``axis``. ``b`` minus ``a`` is twice the deviation of ``b``. Epochs are 1 s apart, or farther where there
-        would be more than 10,000. ``attrs["areograph"]`` contains the statistics.
+        would be more than 10,000. ``attrs["areograph"]``, JSON, contains the statistics.
 
     Raises
     ------
@@ -103,7 +104,8 @@ def compare_kernels(
     if (t0 is None) != (t1 is None):
         raise UsageError("only one of t0 and t1 is given; expected both, or none")
     utc = None if t0 is None or t1 is None else [t0, t1]
-    answer = json.loads(_native.compare_kernels([("a", paths_of(a)), ("b", paths_of(b))], utc))
+    text, used = _native.compare_kernels([("a", kernels_at(a)), ("b", kernels_at(b))], utc)
+    answer = json.loads(text)
     orbit, attitude = answer["orbit"], answer.get("attitude")
     variables = {
         "position_m": (
@@ -121,9 +123,19 @@ def compare_kernels(
             {"units": "arcsec"},
         )
         coords["et_attitude"] = attitude.pop("epochs_et_s")
-    files = {"a": paths_of(a), "b": paths_of(b)}
-    attrs = provenance(files=files, statistics=answer)
+    kernels = {name: kernels_of(each) for name, each in zip("ab", used, strict=True)}
+    attrs = provenance_text(kernels=kernels, statistics=answer)
     dataset: Dataset = xarray.Dataset(variables, coords=coords, attrs=attrs)
     return dataset
 
 
+def _utc_texts(et: Any) -> list[str] | None:
+    """Return times in UTC as text, or None for numbers."""
+    one = utc_text(et)
+    if one is not None:
+        return [one]
+    if not isinstance(et, Iterable):
+        return None
+    texts = [utc_text(time) for time in et]
+    found = [text for text in texts if text is not None]
+    return found if found and len(found) == len(texts) else None

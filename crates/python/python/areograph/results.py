@@ -408,5 +408,5 @@ def _optional(module: str) -> Any:
     except ImportError as error:
         package = module.partition(".")[0]
         raise ImportError(
-            f"Tables require {package}, which cannot be imported ({error}): pip install areograph[geo]"
+            f"Tables require {package}, which cannot be imported ({error}); install it with pip"
         ) from error

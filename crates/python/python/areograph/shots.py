@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import json
 import os
 import tempfile
@@ -13,7 +14,17 @@ import numpy
 import pyarrow
 
 from . import _native
-from ._common import Paths, StrPath, column, kernels_of, optional, paths_of, provenance
+from ._common import (
+    Paths,
+    StrPath,
+    column,
+    kernels_at,
+    kernels_of,
+    optional,
+    paths_of,
+    provenance,
+    utc_text,
+)
 from .errors import UsageError
 
 if TYPE_CHECKING:
@@ -22,17 +33,19 @@ if TYPE_CHECKING:
 
 # A box, a file of GeoJSON, or an object with __geo_interface__ (GeoPandas, Shapely).
 Area: TypeAlias = Any
-Time: TypeAlias = "float | str | None"
+Time: TypeAlias = "float | str | datetime.datetime | numpy.datetime64 | None"
 
 #: Radius of the sphere of the coordinate reference system, metres: heights of points refer to it.
 _SPHERE_M = 3_396_190.0
 _CHANNELS = (1, 2, 3, 4)
+#: Seconds between two shots beyond which a track does not join them.
+_GAP_S = 2.0
 # Columns that only a search with windows has, or that other columns repeat.
 _OF_SEARCH = ("windows", "geometry")
 
 
 def read_pedr(
-    path: Paths, *, orbits: Iterable[int] | None = None, columns: Sequence[str] | None = None
+    path: Paths, *, orbits: int | Iterable[int] | None = None, columns: str | Sequence[str] | None = None
 ) -> pyarrow.Table:
     """Read every shot with a return of PEDR files, of any class.
 
@@ -41,7 +54,7 @@ def read_pedr(
     path
         PEDR files and folders that contain them, or tables of the Orbital Data Explorer.
     orbits
-        Only shots of these orbits.
+        Only shots of these orbits, as the files number them.
     columns
         Names of columns, in the order of the result; by default all. Few columns are read faster.
 
@@ -63,13 +76,20 @@ def read_pedr(
         If single records with errors are omitted with their shots.
     """
     known = [name for name in _native.shot_columns() if name not in _OF_SEARCH]
+    if isinstance(columns, str):
+        columns = [columns]
     wanted = list(known if columns is None else columns)
     _require_known(wanted, known)
+    if isinstance(orbits, int):
+        orbits = [orbits]
     read = wanted if orbits is None or "orbit" in wanted else [*wanted, "orbit"]
     table, statement = _search(path, columns=read, check_all=True)
     if orbits is not None:
         compute = optional("pyarrow.compute", "geo")
-        members = pyarrow.array(sorted(set(orbits)), type=table.schema.field("orbit").type)
+        try:
+            members = pyarrow.array(sorted(set(orbits)), type=table.schema.field("orbit").type)
+        except (pyarrow.ArrowException, OverflowError, TypeError):
+            raise UsageError(f"orbits are {orbits!r}; expected orbit numbers") from None
         table = table.filter(compute.is_in(table["orbit"], members))
         statement["orbits"] = members.to_pylist()
     table = table.select(wanted)
@@ -101,9 +121,10 @@ def search_shots(
         PEDR files and folders that contain them, or tables of the Orbital Data Explorer.
     aoi
         Area: ``(west, east, south, north)`` in degrees, east longitudes -180 to 360 (west above east crosses 0 or
-        180); a GeoJSON file; or polygons of GeoPandas or Shapely. By default all of Mars.
+        180); a GeoJSON file; or polygons of GeoPandas or Shapely, without a coordinate reference system or in
+        IAU_2015:49900. By default all of Mars.
     t0, t1
-        First and last time tag: TDB seconds past J2000, or UTC as text, which requires ``leap_seconds``.
+        First and last time tag: TDB seconds past J2000, or UTC as text or datetime, which requires ``leap_seconds``.
     classes
         Classification codes to keep: 1 ground, 0 cloud or noise.
     channels, attitude_flags
@@ -111,7 +132,8 @@ def search_shots(
     max_off_nadir_deg
         Largest off-nadir angle of the laser.
     solar_longitude_deg
-        First and last areocentric longitude of the Sun: the season of Mars.
+        First and last areocentric longitude of the Sun, 0 to 360 degrees: the season of Mars. If the first exceeds the
+        last, the interval contains 0.
     leap_seconds
         Leap-second kernel, such as ``naif0012.tls``.
 
@@ -126,13 +148,13 @@ def search_shots(
     ------
     InputError
         If a file cannot be searched.
+    UsageError
+        If the area, the interval of time or the filter is not valid.
 
     Warns
     -----
     UserWarning
         If records with errors are omitted: shots may be missing.
-    UsageError
-        If the area or the interval of time is not valid.
     """
     optional("geopandas", "geo")
     names = [name for name in _native.shot_columns() if name != "geometry"]
@@ -170,8 +192,9 @@ def tracks(
     Returns
     -------
     geopandas.GeoDataFrame
-        ``orbit``, ``shots``, ``et_start_s``, ``et_stop_s`` and ``geometry``: lines through the footprints, in two parts
-        where a track crosses 180 degrees of longitude. Profiles of a single shot have a point.
+        ``orbit``, ``shots``, ``et_start_s``, ``et_stop_s`` and ``geometry``: lines through the footprints, in parts where
+        more than 2 s lie between two shots, and at 180 degrees of longitude. A part of a single shot has no line;
+        profiles without any line have points.
     """
     geopandas, shapely = optional("geopandas", "geo"), optional("shapely", "geo")
     names = ["et_tag_s", "orbit", "longitude_deg", "latitude_deg"]
@@ -184,21 +207,30 @@ def tracks(
     east_deg = _signed(table["longitude_deg"].to_numpy())
     points_deg = numpy.column_stack([east_deg, table["latitude_deg"].to_numpy()])
     begins = (numpy.diff(orbit) != 0) | (numpy.diff(et_s) > _native.PROFILE_PAUSE_S)
-    starts = numpy.flatnonzero(numpy.concatenate([[len(et_s) > 0], begins]))
-    rows = []
-    for first, end in zip(starts, [*starts[1:], len(et_s)], strict=True):
-        part = points_deg[first:end]
-        turns = numpy.flatnonzero(numpy.abs(numpy.diff(part[:, 0])) > 180.0) + 1
-        pieces = [piece for piece in numpy.split(part, turns) if len(piece) > 1]
-        if len(part) == 1 or not pieces:
-            geometry = shapely.MultiPoint(part) if len(part) > 1 else shapely.Point(part[0])
-        elif len(pieces) == 1:
-            geometry = shapely.LineString(pieces[0])
+    tracks: dict[str, list[Any]] = {"orbit": [], "shots": [], "et_start_s": [], "et_stop_s": [], "geometry": []}
+    for rows in numpy.split(numpy.arange(len(et_s)), numpy.flatnonzero(begins) + 1):
+        if len(rows) == 0:
+            continue
+        gaps = numpy.flatnonzero(numpy.diff(et_s[rows]) > _GAP_S) + 1
+        parts = [part for run in numpy.split(points_deg[rows], gaps) for part in _at_antimeridian(run)]
+        lines = [part for part in parts if len(part) > 1]
+        tracks["orbit"].append(int(orbit[rows[0]]))
+        tracks["shots"].append(len(rows))
+        tracks["et_start_s"].append(et_s[rows[0]])
+        tracks["et_stop_s"].append(et_s[rows[-1]])
+        if not lines:
+            tracks["geometry"].append(shapely.MultiPoint(points_deg[rows]))
+        elif len(lines) == 1:
+            tracks["geometry"].append(shapely.LineString(lines[0]))
         else:
-            geometry = shapely.MultiLineString(pieces)
-        rows.append((int(orbit[first]), end - first, et_s[first], et_s[end - 1], geometry))
-    names = ["orbit", "shots", "et_start_s", "et_stop_s", "geometry"]
-    frame = geopandas.GeoDataFrame(rows, columns=names, geometry="geometry", crs=_crs(table))
+            tracks["geometry"].append(shapely.MultiLineString(lines))
+    columns = {
+        "orbit": numpy.array(tracks["orbit"], dtype=numpy.uint32),
+        "shots": numpy.array(tracks["shots"], dtype=numpy.int64),
+        "et_start_s": numpy.array(tracks["et_start_s"], dtype=numpy.float64),
+        "et_stop_s": numpy.array(tracks["et_stop_s"], dtype=numpy.float64),
+    }
+    frame = geopandas.GeoDataFrame(columns, geometry=tracks["geometry"], crs=_crs(table))
     frame.attrs = provenance(search=statement)
     return frame
 
@@ -237,12 +269,12 @@ def check_ranges(
         raise UsageError(
             f"no column {', '.join(lacking)}; expected shots of read_pedr or search_shots with all columns"
         )
-    columns = [column(shots[name]) for name in _native.RANGE_COLUMNS]
-    residuals, used = _native.range_residuals(columns, paths_of(kernels), clock_bias_s)
+    columns = [column(shots[name], name) for name in _native.RANGE_COLUMNS]
+    residuals, used, bias_s = _native.range_residuals(columns, kernels_at(kernels), clock_bias_s)
     frame: DataFrame = pyarrow.table(residuals).to_pandas()
     if isinstance(shots, pandas.DataFrame):
         frame.index = shots.index
-    frame.attrs = provenance(kernels=kernels_of(used), clock_bias_s=clock_bias_s)
+    frame.attrs = provenance(kernels=kernels_of(used), clock_bias_s=bias_s)
     return frame
 
 
@@ -282,8 +314,13 @@ def _windows(aoi: Area, folder: str) -> tuple[list[list[float]], list[str]]:
         return [], []
     if isinstance(aoi, str | os.PathLike):
         return [], [os.fspath(aoi)]
+    crs = getattr(aoi, "crs", None)
+    if crs is not None and crs != _crs_of_shots():
+        expected = "IAU_2015:49900 (areocentric latitudes, east longitudes), or no crs; see to_crs and set_crs"
+        raise UsageError(f"the crs of aoi is {crs.name}; expected {expected}")
     shape = aoi if isinstance(aoi, dict) else getattr(aoi, "__geo_interface__", None)
     if shape is not None:
+        _require_polygons(shape)
         file = os.path.join(folder, "aoi.geojson")
         with open(file, "w", encoding="utf-8") as out:
             json.dump(shape, out)
@@ -296,6 +333,25 @@ def _windows(aoi: Area, folder: str) -> tuple[list[list[float]], list[str]]:
     return [[west, east, south, north]], []
 
 
+def _require_polygons(shape: dict[str, Any]) -> None:
+    """Raise for a shape of GeoJSON with other geometries than polygons, or without any."""
+    if shape.get("type") == "FeatureCollection":
+        geometries = [(feature.get("geometry") or {}).get("type") for feature in shape.get("features", [])]
+    elif shape.get("type") == "Feature":
+        geometries = [(shape.get("geometry") or {}).get("type")]
+    else:
+        geometries = [shape.get("type")]
+    others = [str(kind) for kind in geometries if kind not in ("Polygon", "MultiPolygon")]
+    if others or not geometries:
+        found = f"a {others[0]}" if others else "no geometry"
+        raise UsageError(f"aoi contains {found}; expected polygons")
+
+
+def _crs_of_shots() -> Any:
+    pyproj = optional("pyproj", "geo")
+    return pyproj.CRS.from_user_input("IAU_2015:49900")
+
+
 def _interval(t0: Time, t1: Time, leap_seconds: StrPath | None) -> list[float] | None:
     if t0 is None and t1 is None:
         return None
@@ -303,13 +359,15 @@ def _interval(t0: Time, t1: Time, leap_seconds: StrPath | None) -> list[float] |
     for name, time, open_s in (("t0", t0, -numpy.inf), ("t1", t1, numpy.inf)):
         if time is None:
             ends_s.append(open_s)
-        elif not isinstance(time, str):
-            ends_s.append(float(time))
+            continue
+        utc = utc_text(time)
+        if utc is None:
+            ends_s.append(float(column(time, name)[0]))
         elif leap_seconds is None:
             expected = "TDB seconds past J2000, or leap_seconds with a leap-second kernel"
             raise UsageError(f"{name} is {time!r}, a time in UTC; expected {expected}")
         else:
-            ends_s += _native.utc_to_et([time], paths_of(leap_seconds))
+            ends_s += _native.utc_to_et([utc], kernels_at(leap_seconds))
     return ends_s
 
 
@@ -328,6 +386,21 @@ def _crs(table: pyarrow.Table) -> Any:
     return geo["columns"]["geometry"]["crs"]
 
 
+def _at_antimeridian(points_deg: Any) -> list[Any]:
+    """Divide a line where it crosses 180 degrees of longitude, with a point on the meridian at both ends."""
+    pieces, piece = [], list(points_deg[:1])
+    for (east_a, north_a), (east_b, north_b) in zip(points_deg[:-1], points_deg[1:], strict=True):
+        if abs(east_b - east_a) > 180.0:
+            edge = numpy.copysign(180.0, east_a)
+            across = east_b + 2.0 * edge - east_a
+            share = (edge - east_a) / across if across else 0.0
+            north = north_a + share * (north_b - north_a)
+            pieces.append(numpy.array([*piece, (edge, north)]))
+            piece = [(-edge, north)]
+        piece.append((east_b, north_b))
+    return [*pieces, numpy.array(piece)]
+
+
 def _signed(longitude_deg: Any) -> Any:
     return numpy.where(longitude_deg > 180.0, longitude_deg - 360.0, longitude_deg)
 
@@ -338,5 +411,6 @@ def _names(shots: Any) -> list[str]:
 
 def _require_known(wanted: Sequence[str], known: Sequence[str]) -> None:
     unknown = [name for name in wanted if name not in known]
-    if unknown:
-        raise UsageError(f"no column {', '.join(unknown)}; expected some of {', '.join(known)}")
+    if unknown or not wanted:
+        found = f"no column {', '.join(unknown)}" if unknown else "no columns"
+        raise UsageError(f"{found}; expected some of {', '.join(known)}")
