@@ -9,7 +9,6 @@
 
 use crate::common;
 use crate::common::page;
-use crate::common::readers;
 
 mod numbers;
 mod sources;

@@ -21,8 +21,11 @@ use super::{
     failures::{detached, interruptible},
 };
 
+/// Names of kernels with their BLAKE3.
+pub(crate) type Names = Vec<(String, String)>;
+
 /// Name and BLAKE3 of every kernel.
-pub(crate) fn provenance(kernels: &KernelSet) -> Vec<(String, String)> {
+pub(crate) fn provenance(kernels: &KernelSet) -> Names {
     let kernels = kernels.kernels().iter();
     kernels
         .map(|kernel| (kernel.file_name(), kernel.blake3.clone()))
@@ -50,7 +53,7 @@ pub(crate) fn spacecraft_states(
     et_s: &Bound<'_, PyAny>,
     kernels: Vec<PathBuf>,
     body_fixed: bool,
-) -> PyResult<(Columns, Vec<(String, String)>)> {
+) -> PyResult<(Columns, Names)> {
     let [et_s] = arrays(py, ["et"], [et_s])?;
     let (states, utc, kernels) = interruptible(py, |stop| {
         let set = KernelSet::named(&kernels)?;
@@ -103,7 +106,7 @@ pub(crate) fn compare_kernels(
     py: Python<'_>,
     sets: Vec<(String, Vec<PathBuf>)>,
     utc: Option<[String; 2]>,
-) -> PyResult<(String, Vec<Vec<(String, String)>>)> {
+) -> PyResult<(String, Vec<Names>)> {
     interruptible(py, |_| {
         let sets = sets.into_iter().map(|(id, paths)| {
             let kernels = KernelSet::named(&paths)?;

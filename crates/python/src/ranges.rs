@@ -20,7 +20,7 @@ use rayon::prelude::*;
 use super::{
     columns::{Columns, arrays, numbers},
     failures::{interruptible, usage},
-    kernels::provenance,
+    kernels::{Names, provenance},
 };
 
 /// Columns of shots that [`range_residuals`] takes, in this order.
@@ -91,13 +91,12 @@ fn shot(columns: &[Vec<f64>; 10], row: usize) -> Footprint {
 /// Kernels that do not cover a shot, or cannot be read; columns of other types or lengths.
 #[pyfunction]
 #[pyo3(signature = (columns, kernels, clock_bias_s=None))]
-#[allow(clippy::type_complexity, reason = "columns, and names with hashes")]
 pub(crate) fn range_residuals(
     py: Python<'_>,
     columns: [Bound<'_, PyAny>; 10],
     kernels: Vec<PathBuf>,
     clock_bias_s: Option<f64>,
-) -> PyResult<(Columns, Vec<(String, String)>, f64)> {
+) -> PyResult<(Columns, Names, f64)> {
     let columns = arrays(py, RANGE_COLUMNS, columns.each_ref())?;
     let bias_s = clock_bias_s.unwrap_or(usual_altimeter().clock_bias_s);
     if !(-BIAS_MAX_S..=BIAS_MAX_S).contains(&bias_s) {
