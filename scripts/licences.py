@@ -25,9 +25,10 @@ def metadata():
 
 
 def linked(graph):
-    """The packages reached from the program without those that only its tests or build scripts use."""
+    """The packages reached from the program and its Python module without those that only its tests or build scripts use."""
     nodes = {node["id"]: node for node in graph["resolve"]["nodes"]}
-    waiting, reached = [graph["resolve"]["root"]], set()
+    own = {package["id"] for package in graph["packages"] if package["name"] in ("areograph", "areograph-python")}
+    waiting, reached = list(own), set()
     while waiting:
         package = waiting.pop()
         if package in reached:
@@ -36,7 +37,7 @@ def linked(graph):
         for dependency in nodes[package]["deps"]:
             if any(kind["kind"] is None for kind in dependency["dep_kinds"]):
                 waiting.append(dependency["pkg"])
-    return reached - {graph["resolve"]["root"]}
+    return reached - own
 
 
 def main(folder):

@@ -1,4 +1,5 @@
-//! Control networks of ISIS as tie points: the binary and the text form give the same adjustment.
+//! Control networks of ISIS as tie points: images are recognised by their serial numbers, and the binary and the text form
+//! give the same adjustment.
 #![allow(
     clippy::unwrap_used,
     reason = "helpers of tests work in temporary folders and may fail loudly"
@@ -13,12 +14,6 @@ use common::{
     mission::{products, site_run, succeed},
 };
 
-/// Names of the images in networks of ISIS.
-const SERIAL_NUMBERS: [(&str, &str); 2] = [
-    ("E02-01301", "MGS/669166528:118/MOC-NA/BROAD_BAND"),
-    ("E02-02016", "MGS/669788295:103/MOC-NA/BROAD_BAND"),
-];
-
 /// Products of Isidis with the network `name` of an earlier adjustment as tie points without those
 /// that state the hash of the configuration or of the file.
 fn adjusted_with(name: &str) -> BTreeMap<PathBuf, Vec<u8>> {
@@ -26,11 +21,6 @@ fn adjusted_with(name: &str) -> BTreeMap<PathBuf, Vec<u8>> {
     let network = site_run("isidis").join("exchange").join(name);
     case.write(&format!("ties/{name}"), fs::read(network).unwrap());
     case.replace("site.toml", "ties/isidis.csv", &format!("ties/{name}"));
-    for (id, serial_number) in SERIAL_NUMBERS {
-        let id = format!("id = \"{id}\"\n");
-        let named = format!("{id}serial_number = \"{serial_number}\"\n");
-        case.replace("site.toml", &id, &named);
-    }
     succeed(&mut case.run());
     let mut products = products(&case.path("out/isidis"));
     let states_file = |path: &PathBuf| {

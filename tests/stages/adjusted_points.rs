@@ -18,8 +18,8 @@ use areograph::{
     pds::ties::read_ties,
     products::{
         ControlMeasure, ControlNetwork, ControlPoint, GroundEstimate, ImageMeasure, LidarPoint,
-        NetworkMeasure, NetworkPoint, ProfileShift, isis_serial_number, write_binary_network,
-        write_control_network, write_gcp, write_lidar_data,
+        NetworkMeasure, NetworkPoint, ProfileShift, write_binary_network, write_control_network,
+        write_gcp, write_lidar_data,
     },
     spice::{KernelSet, Session},
     stages::tag_times::tag_times,
@@ -277,11 +277,11 @@ fn serial_numbers_are_those_of_a_real_network() {
         ..ImageConfig::default()
     };
     let mut times = tag_times(&[image], &session).unwrap().remove(0);
-    let serial = isis_serial_number(&times).unwrap();
+    let serial = times.isis_serial_number().unwrap();
     let network = fs::read_to_string(network).unwrap();
     assert!(network.contains(&format!(",{serial},")), "{serial}");
     times.sclk_start = None;
-    assert_eq!(isis_serial_number(&times), None);
+    assert_eq!(times.isis_serial_number(), None);
 }
 
 #[test]

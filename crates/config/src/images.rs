@@ -84,8 +84,9 @@ declare_table! {
         /// label names or, without a label, `moc_na`. The spacecraft of the camera determines clock, orbit and
         /// attitude.
         instrument: Option<Instrument> = key(CAMERA).example(r#""moc_na""#),
-        /// Name of the image in tie point files and in files for ISIS; the default is the identifier. For a control
-        /// network: the ISIS serial number, whose clock reading must agree with the image.
+        /// Name of the image in tie point files and in files for ISIS. The default is the identifier in tie point files,
+        /// and the serial number that ISIS composes from the label, where it is known, in networks and files for ISIS.
+        /// The clock reading of a serial number must agree with the image.
         serial_number: Option<String> =
             key(text()).example(r#""MGS/651158134:116/MOC-NA""#),
         /// Line times of an image with changing exposure, as with HRSC. Each piece has its first line, counted from 0,

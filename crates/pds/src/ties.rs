@@ -46,7 +46,7 @@ pub struct TieComplaint {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, Cause)]
 #[cause(Input)]
 enum TieError {
-    #[error("this is a binary control network of version {0}; expected version 2 or 5")]
+    #[error("binary control network of version {0}; expected version 2 or 5")]
     #[cause("convert it with ISIS: cnetbin2pvl from=control.net to=control.pvl")]
     BinaryVersion(u64),
     #[error("{key} of the label of a binary control network is {value}; expected a number")]
@@ -65,7 +65,7 @@ enum TieError {
     #[cause(like = BinaryLabel)]
     BinaryHeader(String),
     #[error(
-        "the sizes of the points of the binary control network do not fill the bytes that its label states"
+        "the sizes of the points of the binary control network do not add up to PointsBytes of its label"
     )]
     #[cause(like = BinaryLabel)]
     BinarySizes,
@@ -84,13 +84,12 @@ enum TieError {
     #[error("the table cannot be read: {0}")]
     #[cause(like = Column)]
     Table(String),
-    #[error("none of its records can be read ({records} in all); record {record}: {text}")]
+    #[error("no record of the file can be read ({0} in all); record {1}: {2}")]
     #[cause(like = Column)]
-    Unreadable {
-        records: usize,
-        record: u64,
-        text: String,
-    },
+    Unreadable(usize, u64, String),
+    #[error("no point of the control network can be read ({0} complaints); entry {1}: {2}")]
+    #[cause("write the network again with ISIS")]
+    UnreadableNetwork(usize, u64, String),
     #[error(transparent)]
     #[cause(like = NoNetwork)]
     Label(#[from] LabelError),
@@ -111,7 +110,7 @@ pub fn read_ties(path: &Path) -> Result<TieFile> {
     } else {
         parse_network(&bytes)
     };
-    ties.and_then(readable).in_file(path)
+    ties.and_then(|file| readable(file, table)).in_file(path)
 }
 
 /// A control network of either form.
@@ -129,15 +128,16 @@ fn parse_network(bytes: &[u8]) -> std::result::Result<TieFile, TieError> {
 }
 
 /// Rejects a file without a valid record.
-fn readable(file: TieFile) -> std::result::Result<TieFile, TieError> {
-    match file.complaints.first() {
-        Some(first) if file.ties.is_empty() => Err(TieError::Unreadable {
-            records: file.complaints.len(),
-            record: first.record,
-            text: first.text.clone(),
-        }),
-        _ => Ok(file),
-    }
+fn readable(file: TieFile, is_table: bool) -> std::result::Result<TieFile, TieError> {
+    let Some(first) = file.complaints.first().filter(|_| file.ties.is_empty()) else {
+        return Ok(file);
+    };
+    let (records, text) = (file.complaints.len(), first.text.clone());
+    Err(if is_table {
+        TieError::Unreadable(records, first.record, text)
+    } else {
+        TieError::UnreadableNetwork(records, first.record, text)
+    })
 }
 
 /// Formats tie points as a table that [`read_ties`] reads; coordinates to a ten-thousandth of a pixel. It has columns
@@ -386,21 +386,27 @@ mod tests {
     fn a_file_without_a_readable_record_says_what_these_lack() {
         let refused = |rows: &str| {
             let table = format!("point_id,serial_number,sample,line\n{rows}");
-            readable(parse_table(table.as_bytes()).unwrap())
+            readable(parse_table(table.as_bytes()).unwrap(), true)
                 .unwrap_err()
                 .to_string()
         };
         assert_eq!(
             refused("1,A,,2\n1,B,3,x\n"),
-            "none of its records can be read (2 in all); record 2: point_id \"1\", serial_number \"A\", sample \"\", line \
+            "no record of the file can be read (2 in all); record 2: point_id \"1\", serial_number \"A\", sample \"\", line \
              \"2\": expected two names and two numbers"
         );
         assert_eq!(
             refused("1,A,1\n"),
-            "none of its records can be read (1 in all); record 2: 3 fields; expected 4, as in the header"
+            "no record of the file can be read (1 in all); record 2: 3 fields; expected 4, as in the header"
         );
         assert!(refused(",A,1,2\n").contains("point_id \"\""));
-        assert!(readable(parse_table(b"point_id,serial_number,sample,line\n").unwrap()).is_ok());
+        assert!(
+            readable(
+                parse_table(b"point_id,serial_number,sample,line\n").unwrap(),
+                true
+            )
+            .is_ok()
+        );
     }
 
     #[test]

@@ -19,7 +19,7 @@ pub(super) mod tables;
 pub use binary_network::write_binary_network;
 pub use control_network::{ControlNetwork, NetworkMeasure, NetworkPoint, write_control_network};
 pub use gcp::{ControlMeasure, ControlPoint, write_gcp};
-pub use lidar_data::{LidarPoint, ProfileShift, isis_serial_number, write_lidar_data};
+pub use lidar_data::{LidarPoint, ProfileShift, write_lidar_data};
 pub use points::{GroundEstimate, ImageMeasure};
 
 /// Decimals of degrees: 1e-9° are 0.06 mm on the ground.

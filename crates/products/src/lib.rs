@@ -77,8 +77,8 @@ pub use archive::{
 pub use calibration::{CalibrationProducts, write_calibration_products};
 pub use exchange::{
     ControlMeasure, ControlNetwork, ControlPoint, GroundEstimate, ImageMeasure, LidarPoint,
-    NetworkMeasure, NetworkPoint, ProfileShift, isis_serial_number, write_binary_network,
-    write_control_network, write_gcp, write_lidar_data,
+    NetworkMeasure, NetworkPoint, ProfileShift, write_binary_network, write_control_network,
+    write_gcp, write_lidar_data,
 };
 pub use files::{read_bytes, write_bytes, write_json};
 pub use found_shots::{ShotBatches, ShotsFile};

@@ -92,7 +92,7 @@ impl Input for ImageNames<'_> {
 
 impl Stage for ReadTies<'_> {
     const NAME: &'static str = "read_ties";
-    const METHOD: u32 = 6;
+    const METHOD: u32 = 7;
     const CHECKED: bool = true;
     type Output = Ties;
     stage_inputs!(fingerprint);
@@ -126,11 +126,7 @@ impl Stage for ReadTies<'_> {
 /// the site; none that joins two of them; most points measured at places of other points; a measurement outside the
 /// delivered lines or the samples of an image with `times`.
 pub fn read_ties(ties: &TiesConfig, images: &[ImageConfig], times: &[&ImageTimes]) -> Result<Ties> {
-    let names: BTreeMap<&str, usize> = images
-        .iter()
-        .map(ImageConfig::name_in_ties)
-        .zip(0..)
-        .collect();
+    let names = names(images, times);
     let mut read = Ties::default();
     let mut first = BTreeMap::new();
     let mut contents: BTreeMap<String, &PathBuf> = BTreeMap::new();
@@ -160,7 +156,7 @@ pub fn read_ties(ties: &TiesConfig, images: &[ImageConfig], times: &[&ImageTimes
         }
     }
     if read.points.is_empty() {
-        return Err(nothing_found(&read, &names).into());
+        return Err(nothing_found(&read, images).into());
     }
     if read.multi_image() == 0 {
         let points = read.points.len();
@@ -184,12 +180,25 @@ pub fn read_ties(ties: &TiesConfig, images: &[ImageConfig], times: &[&ImageTimes
     Ok(read)
 }
 
+/// Indices of the images by their names in tie points: as configured, and as ISIS composes them.
+fn names(images: &[ImageConfig], times: &[&ImageTimes]) -> BTreeMap<String, usize> {
+    let configured = images.iter().map(|image| image.name_in_ties().to_owned());
+    let mut names: BTreeMap<String, usize> = configured.zip(0..).collect();
+    for (index, image) in images.iter().enumerate() {
+        let times = times.iter().find(|times| times.id == image.id);
+        if let Some(serial_number) = times.and_then(|times| times.isis_serial_number()) {
+            names.entry(serial_number).or_insert(index);
+        }
+    }
+    names
+}
+
 impl Ties {
     /// Adds a point; `first` holds the index of the first point of each identifier.
     fn take(
         &mut self,
         tie: TiePoint<String>,
-        names: &BTreeMap<&str, usize>,
+        names: &BTreeMap<String, usize>,
         first: &mut BTreeMap<String, usize>,
     ) {
         let tie = tie.in_images(

@@ -113,6 +113,20 @@ impl ImageTimes {
         name.to_uppercase().replace('_', " ")
     }
 
+    /// Serial number that ISIS composes for the image; `None` when its label has no clock string, or where ISIS names
+    /// images of its camera differently.
+    ///
+    /// # Source
+    /// `MgsMocSerialNumber.trn` of ISIS (spacecraft, clock, instrument, filter) and the network of M01/00115, which names
+    /// that image `MGS/610472061:131/MOC-NA/BROAD_BAND`.
+    #[must_use]
+    pub fn isis_serial_number(&self) -> Option<String> {
+        let clock = self.sclk_start.as_ref()?;
+        let camera = self.instrument.label.serial.as_ref()?;
+        let spacecraft = &self.instrument.spacecraft.name;
+        Some(format!("{spacecraft}/{}/{camera}", clock.trim()))
+    }
+
     /// Viewing directions of the samples of a line.
     #[must_use]
     pub fn detector(&self) -> Detector {

@@ -1,5 +1,7 @@
 //! Binary ISIS control networks: the points and measures of the text form, from messages.
 
+use std::borrow::Cow;
+
 use prost::Message as _;
 
 use super::{
@@ -21,8 +23,7 @@ pub(super) fn parse_binary_network(label: &Label, bytes: &[u8]) -> Result<TieFil
     let layout = Layout::of(label)?;
     let points = match layout.version {
         2 => sized_by_header(layout.header(bytes)?, layout.points(bytes)?)?,
-        5 => sized_one_by_one(layout.points(bytes)?)?,
-        version => return Err(TieError::BinaryVersion(version)),
+        _ => sized_one_by_one(layout.points(bytes)?)?,
     };
     let mut gathered = Gathered::default();
     for (record, point) in (1..).zip(points) {
@@ -45,7 +46,8 @@ impl Layout {
     fn of(label: &Label) -> Result<Self, TieError> {
         let number = |group: &str, key: &'static str| {
             let entry = label.entries.iter();
-            let mut entry = entry.filter(|entry| entry.group == group && entry.key == key);
+            let mut entry =
+                entry.filter(|entry| entry.group == group && entry.key.eq_ignore_ascii_case(key));
             let value = entry.next().map_or("missing", |entry| &*entry.value);
             let number = value.parse::<u64>();
             number.map_err(|_| TieError::BinaryLabel {
@@ -53,21 +55,25 @@ impl Layout {
                 value: value.to_owned(),
             })
         };
-        // As ISIS reads a label without a version.
+        // ISIS takes a label without a version for one of version 1, whose places have other names.
         let states_version = label.entries.iter().any(|entry| entry.key == "VERSION");
+        let version = if states_version {
+            number("CONTROLNETWORKINFO", "Version")?
+        } else {
+            1
+        };
+        if !matches!(version, 2 | 5) {
+            return Err(TieError::BinaryVersion(version));
+        }
         Ok(Self {
-            version: if states_version {
-                number("CONTROLNETWORKINFO", "VERSION")?
-            } else {
-                1
-            },
+            version,
             header: [
-                number("CORE", "HEADERSTARTBYTE")?,
-                number("CORE", "HEADERBYTES")?,
+                number("CORE", "HeaderStartByte")?,
+                number("CORE", "HeaderBytes")?,
             ],
             points: [
-                number("CORE", "POINTSSTARTBYTE")?,
-                number("CORE", "POINTSBYTES")?,
+                number("CORE", "PointsStartByte")?,
+                number("CORE", "PointsBytes")?,
             ],
         })
     }
@@ -140,8 +146,16 @@ fn add_point(gathered: &mut Gathered, record: u64, point: &PointEntry) {
         gathered.file.ignored += point.measures.iter().filter(|of| is_ignored(of)).count();
         return;
     }
-    if point.id.is_empty() {
+    let id = text_of(&point.id);
+    if id.is_empty() {
         return gathered.complain(record, WITHOUT_ID.to_owned());
+    }
+    if !(point_type::TIE..=point_type::FIXED).contains(&point.point_type) {
+        let text = format!(
+            "point {id}: type {}; expected 0 to 4; the point is treated as free",
+            point.point_type
+        );
+        gathered.complain(record, text);
     }
     let triangle = &point.apriori_covariance_m2;
     let ground = known(&Coordinates {
@@ -154,7 +168,7 @@ fn add_point(gathered: &mut Gathered, record: u64, point: &PointEntry) {
         }),
     });
     let ground = ground.unwrap_or_else(|text| {
-        gathered.complain(record, format!("point {}: {text}", point.id));
+        gathered.complain(record, format!("point {id}: {text}"));
         None
     });
     for measure in &point.measures {
@@ -162,16 +176,25 @@ fn add_point(gathered: &mut Gathered, record: u64, point: &PointEntry) {
             gathered.file.ignored += 1;
             continue;
         }
+        let image = text_of(&measure.serial_number);
         let text = |value: Option<f64>| value.map(|value| value.to_string());
         let [line, sample] = [measure.line, measure.sample].map(text);
         let sigmas = [measure.line_sigma_px, measure.sample_sigma_px].map(text);
         let measured = Measured {
-            image: Some(measure.serial_number.as_str()).filter(|name| !name.is_empty()),
+            image: Some(&*image).filter(|name| !name.is_empty()),
             line: line.as_deref(),
             sample: sample.as_deref(),
             sigmas: sigmas.each_ref().map(Option::as_deref),
         };
-        add_measure(gathered, record, &point.id, ground, &measured);
+        add_measure(gathered, record, &id, ground, &measured);
+    }
+}
+
+/// A name, in UTF-8 or else in Latin-1, which ISIS writes.
+fn text_of(bytes: &[u8]) -> Cow<'_, str> {
+    match str::from_utf8(bytes) {
+        Ok(text) => Cow::Borrowed(text),
+        Err(_) => bytes.iter().map(|byte| char::from(*byte)).collect(),
     }
 }
 
@@ -196,11 +219,11 @@ mod tests {
 
     fn entry(id: &str, point_type: i32) -> PointEntry {
         PointEntry {
-            id: id.to_owned(),
+            id: id.as_bytes().to_vec(),
             point_type,
             measures: vec![
                 MeasureEntry {
-                    serial_number: "A".to_owned(),
+                    serial_number: b"A".to_vec(),
                     line: Some(1.0),
                     sample: Some(2.5),
                     line_sigma_px: Some(0.3),
@@ -208,7 +231,7 @@ mod tests {
                     ..MeasureEntry::default()
                 },
                 MeasureEntry {
-                    serial_number: "B".to_owned(),
+                    serial_number: b"B".to_vec(),
                     line: Some(8.0),
                     sample: Some(7.0),
                     ..MeasureEntry::default()
@@ -287,6 +310,21 @@ mod tests {
     }
 
     #[test]
+    fn names_in_latin_1_and_unknown_types_are_read() {
+        let mut named = entry("", point_type::FREE);
+        named.id = b"H\xf6he".to_vec();
+        let unknown = entry("unknown", 9);
+        let points = [named, unknown].map(|point| point.encode_to_vec());
+        let file = parse_network(&network(5, &points)).unwrap();
+        assert_eq!((&*file.ties[0].id, file.ties.len()), ("Höhe", 2));
+        assert!(
+            file.complaints[0]
+                .text
+                .starts_with("point unknown: type 9; expected 0 to 4")
+        );
+    }
+
+    #[test]
     fn damage_is_reported_and_never_a_panic() {
         let points = [entry("a", 2), entry("b", 2)].map(|point| point.encode_to_vec());
         for version in [2, 5] {
@@ -312,7 +350,9 @@ mod tests {
             let file = network(version, &points);
             parse_network(&file).unwrap_err()
         };
-        assert_eq!(text(1), TieError::BinaryVersion(1));
+        assert_eq!(text(3), TieError::BinaryVersion(3));
+        let first = b"Object = ProtoBuffer\n Object = Core\n StartByte = 65536\n Bytes = 9\n End_Object\nEnd_Object\nEnd\n";
+        assert_eq!(parse_network(first), Err(TieError::BinaryVersion(1)));
         let mut unsized_points = network(5, &points);
         unsized_points[LABEL_BYTES] = 0xff;
         assert_eq!(parse_network(&unsized_points), Err(TieError::BinarySizes));

@@ -41,7 +41,7 @@ pub const REGISTERED_SUB_PIXEL: i32 = 3;
 #[derive(Clone, PartialEq, prost::Message)]
 pub struct HeaderV2 {
     /// Size of every point, bytes.
-    #[prost(int32, repeated, packed = "false", tag = "7")]
+    #[prost(int32, repeated, packed = "true", tag = "7")]
     pub point_sizes: Vec<i32>,
 }
 
@@ -71,9 +71,9 @@ pub struct HeaderV5 {
 /// A point of a network; coordinates are body-fixed, metres, covariances the upper triangles of their matrices, m².
 #[derive(Clone, PartialEq, prost::Message)]
 pub struct PointEntry {
-    /// Identifier.
-    #[prost(string, required, tag = "1")]
-    pub id: String,
+    /// Identifier; ISIS writes Latin-1 and reads UTF-8.
+    #[prost(bytes = "vec", required, tag = "1")]
+    pub id: Vec<u8>,
     /// One of [`point_type`].
     #[prost(int32, required, tag = "2")]
     pub point_type: i32,
@@ -127,9 +127,9 @@ pub struct PointEntry {
 /// A measure of a point; lines and samples have the middle of the first pixel at 1.
 #[derive(Clone, PartialEq, prost::Message)]
 pub struct MeasureEntry {
-    /// Serial number of the image.
-    #[prost(string, required, tag = "1")]
-    pub serial_number: String,
+    /// Serial number of the image, as the identifier.
+    #[prost(bytes = "vec", required, tag = "1")]
+    pub serial_number: Vec<u8>,
     /// Type, such as [`REGISTERED_SUB_PIXEL`].
     #[prost(int32, required, tag = "2")]
     pub measure_type: i32,

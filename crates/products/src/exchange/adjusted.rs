@@ -6,7 +6,7 @@ use nalgebra::Matrix3;
 
 use super::{
     gcp::{ControlMeasure, ControlPoint, write_gcp},
-    lidar_data::{LidarPoint, ProfileShift, isis_serial_number, write_lidar_data},
+    lidar_data::{LidarPoint, ProfileShift, write_lidar_data},
     points::{GroundEstimate, ImageMeasure},
 };
 use crate::{
@@ -77,7 +77,7 @@ pub(super) fn isis_name(site: &SiteProducts, image: &ImageProducts) -> String {
     let configured = site.config.images.iter().find(|image| image.id == *id);
     let configured = configured.and_then(|image| image.serial_number.clone());
     configured
-        .or_else(|| isis_serial_number(image.times))
+        .or_else(|| image.times.isis_serial_number())
         .unwrap_or_else(|| id.clone())
 }
 

@@ -119,7 +119,7 @@ fn point_entry(point: &NetworkPoint) -> std::result::Result<PointEntry, ProductE
     let measures = point.measures.iter();
     let measures = measures.map(|measure| measure_entry(measure, point.is_rejected));
     Ok(PointEntry {
-        id: point.id.to_owned(),
+        id: point.id.as_bytes().to_vec(),
         point_type: match point.known {
             None => point_type::FREE,
             Some(_) if is_constrained => point_type::CONSTRAINED,
@@ -157,7 +157,7 @@ fn measure_entry(
     let [line_sigma_px, sample_sigma_px] = pair(of.sigma_px)?;
     let [line_residual_px, sample_residual_px] = pair(of.residual_px)?;
     Ok(MeasureEntry {
-        serial_number: of.measure.image.to_owned(),
+        serial_number: of.measure.image.as_bytes().to_vec(),
         measure_type: REGISTERED_SUB_PIXEL,
         sample: sample.map(|edge| edge + EDGE_TO_ISIS),
         line: line.map(|edge| edge + EDGE_TO_ISIS),

@@ -27,7 +27,6 @@ use areograph_base::{
     time::Et,
     units::{METRES_PER_KM, RADIANS_PER_DEGREE},
 };
-use areograph_stages::tag_times::ImageTimes;
 
 /// A shot whose range constrains the images that were exposed at the time.
 #[derive(Debug, Clone, PartialEq)]
@@ -111,20 +110,6 @@ struct Measure<'a> {
     line: f64,
     sample: f64,
     serial_number: &'a str,
-}
-
-/// Serial number that ISIS composes for an image; `None` when its label has no clock string, or where ISIS names images
-/// of its camera differently.
-///
-/// # Source
-/// `MgsMocSerialNumber.trn` of ISIS (spacecraft, clock, instrument, filter) and the network of M01/00115, which names
-/// that image `MGS/610472061:131/MOC-NA/BROAD_BAND`.
-#[must_use]
-pub fn isis_serial_number(image: &ImageTimes) -> Option<String> {
-    let clock = image.sclk_start.as_ref()?;
-    let camera = image.instrument.label.serial.as_ref()?;
-    let spacecraft = &image.instrument.spacecraft.name;
-    Some(format!("{spacecraft}/{}/{camera}", clock.trim()))
 }
 
 /// Writes `points` to `path`, which must end in `.json` for ISIS to take it, and reads it back; `shifts` are the shifts

@@ -1,13 +1,12 @@
 //! Tie points that do not belong to the images.
 
-use std::collections::BTreeMap;
-
 use super::{Ties, repeats::SharedPlaces};
 use crate::tag_times::ImageTimes;
 use areograph_base::{
     error::Cause,
     ties::{TieMeasure, TiePoint},
 };
+use areograph_config::ImageConfig;
 
 /// Names of foreign images that a message quotes.
 const NAMES_QUOTED: usize = 5;
@@ -83,7 +82,7 @@ impl Outside {
     }
 }
 
-pub(super) fn nothing_found(read: &Ties, names: &BTreeMap<&str, usize>) -> TiesError {
+pub(super) fn nothing_found(read: &Ties, images: &[ImageConfig]) -> TiesError {
     if read.elsewhere.is_empty() {
         return TiesError::Empty;
     }
@@ -94,8 +93,9 @@ pub(super) fn nothing_found(read: &Ties, names: &BTreeMap<&str, usize>) -> TiesE
         0 => String::new(),
         more => format!(" and {more} more"),
     };
+    let names: Vec<&str> = images.iter().map(ImageConfig::name_in_ties).collect();
     TiesError::NoImage {
         found: found.join(", ") + &more,
-        expected: names.keys().copied().collect::<Vec<_>>().join(", "),
+        expected: names.join(", "),
     }
 }
