@@ -48,6 +48,9 @@ pub enum BiasScope {
 }
 
 impl MolaClock {
+    /// Largest bias of time tags, seconds.
+    pub const BIAS_MAX_S: f64 = 10.0;
+
     /// A clock whose tags are late by `late_s`, or early if it is negative, for the position of the spacecraft.
     #[must_use]
     pub fn late_by(late_s: f64, source: String) -> Self {

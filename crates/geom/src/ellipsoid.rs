@@ -91,6 +91,14 @@ pub fn local_axes(place_m: &Vector3<f64>) -> Matrix3<f64> {
     ])
 }
 
+/// Whether a camera is above the horizon of the sphere through a point of a body, both body-fixed, metres: on the far side, a
+/// point lies on a ray of the camera too.
+#[must_use]
+pub fn is_above_horizon(camera_m: &Vector3<f64>, point_m: &Vector3<f64>) -> bool {
+    // False for NaN.
+    point_m.dot(&(camera_m - point_m)) > 0.0
+}
+
 /// First intersection of the ray from `origin` along `direction` with the ellipsoid of `model`, metres.
 ///
 /// `direction` need not have unit length. `None` when the ray misses the ellipsoid or points away from it.

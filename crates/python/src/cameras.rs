@@ -7,7 +7,7 @@ use areograph::{
     error::Result,
     frames::{BodyFixed, Position},
     geom::{
-        ellipsoid::{Spherical, ray_meets_ellipsoid, spherical_to_xyz_m},
+        ellipsoid::{Spherical, is_above_horizon, ray_meets_ellipsoid, spherical_to_xyz_m},
         pushbroom::{ExteriorOrientation as _, Projector},
     },
     pds::isd::SupportSource,
@@ -16,7 +16,7 @@ use areograph::{
 };
 use arrow_array::{ArrayRef, BooleanArray};
 use nalgebra::{Rotation3, UnitQuaternion, Vector3};
-use pyo3::{exceptions::PyValueError, prelude::*};
+use pyo3::prelude::*;
 use rayon::prelude::*;
 
 use super::{
@@ -92,9 +92,7 @@ impl Camera {
                 }
                 let point_m = spherical_to_xyz_m(longitude_rad, latitude_rad, radii_m[row]);
                 let seen = projector.project(&point_m).ok()?;
-                // A point of the far side lies on a ray of the camera too.
-                let from_m = camera.orientation.pose(seen.x).position_m;
-                if !((from_m - point_m).dot(&point_m) > 0.0) {
+                if !is_above_horizon(&camera.orientation.pose(seen.x).position_m, &point_m) {
                     return None;
                 }
                 let focal_px = camera.detector.focal_px(&seen.camera_m).ok()?;
@@ -109,7 +107,7 @@ impl Camera {
         let valid = seen.iter().map(|(_, is_shown)| *is_shown);
         let valid: ArrayRef = Arc::new(valid.map(Some).collect::<BooleanArray>());
         let column = |of: usize| numbers(seen.iter().map(|(pixel, _)| pixel[of]).collect());
-        table([("line", column(0)), ("sample", column(1)), ("valid", valid)])
+        Columns::of([("line", column(0)), ("sample", column(1)), ("valid", valid)])
     }
 
     /// Longitude and latitude in degrees and radius in metres where the rays of image positions meet the ellipsoid, or
@@ -157,7 +155,7 @@ impl Camera {
             rows.map(|row| meet(row).unwrap_or([f64::NAN; 3])).collect()
         });
         let column = |of: usize| numbers(ground.iter().map(|point| point[of]).collect());
-        table([
+        Columns::of([
             ("longitude_deg", column(0)),
             ("latitude_deg", column(1)),
             ("radius_m", column(2)),
@@ -183,14 +181,10 @@ impl Camera {
             .collect();
         let names = ["et_s", "x_m", "y_m", "z_m", "q_w", "q_x", "q_y", "q_z"];
         let columns = names.into_iter().enumerate();
-        table(
+        Columns::of(
             columns.map(|(of, name)| (name, numbers(poses.iter().map(|pose| pose[of]).collect()))),
         )
     }
-}
-
-fn table<'a>(columns: impl IntoIterator<Item = (&'a str, ArrayRef)>) -> PyResult<Columns> {
-    Columns::of(columns).map_err(|error| PyValueError::new_err(error.to_string()))
 }
 
 /// The first point of a ray on a sphere around the centre of the body.

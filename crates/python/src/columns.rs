@@ -3,7 +3,7 @@
 use arrow_array::{
     ArrayRef, Float64Array, RecordBatch, RecordBatchIterator, ffi_stream::FFI_ArrowArrayStream,
 };
-use arrow_schema::{ArrowError, SchemaRef};
+use arrow_schema::SchemaRef;
 use pyo3::{buffer::PyBuffer, exceptions::PyValueError, prelude::*, types::PyCapsule};
 
 /// A table that Arrow libraries take over without a copy (`__arrow_c_stream__` of the `PyCapsule` interface).
@@ -19,10 +19,12 @@ impl Columns {
     }
 
     /// Columns of equal length.
-    pub(crate) fn of<'a>(
-        columns: impl IntoIterator<Item = (&'a str, ArrayRef)>,
-    ) -> Result<Self, ArrowError> {
-        let batch = RecordBatch::try_from_iter(columns)?;
+    ///
+    /// # Errors
+    /// Columns of different lengths.
+    pub(crate) fn of<'a>(columns: impl IntoIterator<Item = (&'a str, ArrayRef)>) -> PyResult<Self> {
+        let batch = RecordBatch::try_from_iter(columns);
+        let batch = batch.map_err(|error| PyValueError::new_err(error.to_string()))?;
         Ok(Self::new(batch.schema(), vec![batch]))
     }
 }

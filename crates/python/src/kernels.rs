@@ -13,7 +13,7 @@ use areograph::{
 };
 use arrow_array::{ArrayRef, StringArray};
 use nalgebra::Vector3;
-use pyo3::{exceptions::PyValueError, prelude::*};
+use pyo3::prelude::*;
 use serde_json::json;
 
 use super::{
@@ -86,8 +86,7 @@ pub(crate) fn spacecraft_states(
     let names = ["x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s"];
     let mut columns: Vec<(&str, ArrayRef)> = names.into_iter().zip(states.map(numbers)).collect();
     columns.push(("utc", Arc::new(StringArray::from(utc))));
-    let columns = Columns::of(columns).map_err(|error| PyValueError::new_err(error.to_string()))?;
-    Ok((columns, kernels))
+    Ok((Columns::of(columns)?, kernels))
 }
 
 /// An interval of time that ends before it begins.

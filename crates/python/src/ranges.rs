@@ -9,12 +9,12 @@ use areograph::{
     footprints::Footprint,
     geom::range_residuals::{RangeResiduals, SpacecraftState},
     spice::{KernelSet, Session},
-    stages::group_profiles::Profile,
-    time::{Et, Interval, Intervals},
+    stages::{check_ranges::trajectory, group_profiles::Profile},
+    time::{Et, Interval},
     units::RADIANS_PER_DEGREE,
 };
 use nalgebra::Vector3;
-use pyo3::{exceptions::PyValueError, prelude::*};
+use pyo3::prelude::*;
 use rayon::prelude::*;
 
 use super::{
@@ -38,11 +38,6 @@ pub(crate) const RANGE_COLUMNS: [&str; 10] = [
 ];
 /// Seconds of trajectory beyond a piece.
 const MARGIN_S: f64 = 0.5;
-/// The tabulated trajectory stays this close to the kernels, metres: a tenth of a PEDR centimetre.
-const TOLERANCE_M: f64 = 0.001;
-
-/// Largest clock bias, as on the command line, seconds.
-const BIAS_MAX_S: f64 = 10.0;
 /// Residuals of a shot of unknown time.
 const UNKNOWN: RangeResiduals = RangeResiduals {
     range_minus_distance_m: f64::NAN,
@@ -99,9 +94,10 @@ pub(crate) fn range_residuals(
 ) -> PyResult<(Columns, Names, f64)> {
     let columns = arrays(py, RANGE_COLUMNS, columns.each_ref())?;
     let bias_s = clock_bias_s.unwrap_or(usual_altimeter().clock_bias_s);
-    if !(-BIAS_MAX_S..=BIAS_MAX_S).contains(&bias_s) {
+    let max_s = MolaClock::BIAS_MAX_S;
+    if !(bias_s.abs() <= max_s) {
         return Err(usage(format!(
-            "clock_bias_s is {bias_s}; expected -{BIAS_MAX_S} to {BIAS_MAX_S}"
+            "clock_bias_s is {bias_s}; expected -{max_s} to {max_s}"
         )));
     }
     let (residuals, kernels) = interruptible(py, |stop| {
@@ -112,7 +108,7 @@ pub(crate) fn range_residuals(
             .iter()
             .map(|tag_s| clock.spacecraft_time(*tag_s))
             .collect();
-        let trajectory = session.trajectory(&pieces(&session, &times)?, TOLERANCE_M)?;
+        let trajectory = trajectory(&session, &pieces(&times), MARGIN_S)?;
         Stopped::check(stop)?;
         let residuals = |row: usize| {
             let at = times[row];
@@ -150,11 +146,7 @@ pub(crate) fn range_residuals(
         ("spacecraft_along_m", column(|(_, of)| of.spacecraft_m.y)),
         ("spacecraft_cross_m", column(|(_, of)| of.spacecraft_m.z)),
     ]);
-    Ok((
-        columns.map_err(|error| PyValueError::new_err(error.to_string()))?,
-        kernels,
-        bias_s,
-    ))
+    Ok((columns?, kernels, bias_s))
 }
 
 /// A shot outside the tabulated trajectory.
@@ -163,18 +155,13 @@ pub(crate) fn range_residuals(
 #[cause(Coverage: "name a spacecraft ephemeris (SPK) that covers the shots")]
 struct Outside(Et);
 
-/// Intervals of the shots, padded as far as the kernels go.
-fn pieces(session: &Session, times: &[Et]) -> Result<Intervals> {
+/// Intervals that contain the shots.
+fn pieces(times: &[Et]) -> Vec<Interval> {
     let known = times.iter().filter(|at| at.seconds().is_finite());
     let mut sorted: Vec<Et> = known.copied().collect();
     sorted.sort_by(|a, b| a.seconds().total_cmp(&b.seconds()));
     let pieces = sorted.chunk_by(|a, b| b.since(*a) <= Profile::PAUSE_S);
-    let pieces: Vec<Interval> = pieces
+    pieces
         .map(|piece| Interval::new(piece[0], piece[piece.len() - 1]))
-        .collect();
-    for piece in &pieces {
-        session.require_position(*piece)?;
-    }
-    let padded = pieces.iter().map(|piece| piece.padded(MARGIN_S));
-    Ok(Intervals::union_of(padded).intersection(&session.coverage()?.spk))
+        .collect()
 }

@@ -51,19 +51,13 @@ type Answered = (String, Vec<String>);
 
 /// Runs a site; the answer is that of `areograph run --json`.
 #[pyfunction]
-pub(crate) fn run(
-    py: Python<'_>,
-    site: PathBuf,
-    out: PathBuf,
-    force: bool,
-    until: Option<String>,
-) -> PyResult<Answered> {
+pub(crate) fn run(py: Python<'_>, site: PathBuf, out: PathBuf, force: bool) -> PyResult<Answered> {
     interruptible(py, |stop| {
         let (config, warnings) = load(&site)?;
         check_out(&out, std::slice::from_ref(&config))?;
         let options = RunOptions {
             out: out.clone(),
-            until: until.as_deref().unwrap_or(PUBLISH),
+            until: PUBLISH,
             force,
             stop,
             hashes: &HashCache::in_folder(&out, false),

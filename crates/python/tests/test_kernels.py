@@ -52,5 +52,7 @@ def test_differences_of_kernel_sets_are_those_of_their_states(mission: Mission) 
     assert len(hashes["mgs_gsfc_scene.bsp"]) == 64
     with pytest.raises(ag.UsageError, match="earlier than the second"):
         ag.compare_kernels(folder / "nav.tm", folder / "gsfc.tm", t0=ends[1], t1=ends[0])
+    with pytest.raises(ag.UsageError, match="UTC as text or datetime"):
+        ag.compare_kernels(folder / "nav.tm", folder / "gsfc.tm", t0=1.0, t1=2.0)
     with pytest.raises(ag.UsageError, match="only one"):
         ag.compare_kernels(folder / "nav.tm", folder / "gsfc.tm", t0=ends[0])

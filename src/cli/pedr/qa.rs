@@ -56,7 +56,7 @@ struct ClockBias(f64);
 impl Arguments {
     fn clock(&self) -> Result<MolaClock, ClockBias> {
         let bias_s = self.clock_bias_s;
-        if !(-10.0..=10.0).contains(&bias_s) {
+        if !(bias_s.abs() <= MolaClock::BIAS_MAX_S) {
             return Err(ClockBias(bias_s));
         }
         let usual = usual_altimeter();

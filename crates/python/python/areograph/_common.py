@@ -38,7 +38,7 @@ def paths_of(paths: Paths) -> list[str]:
     return [os.fspath(path) for path in paths]
 
 
-def optional(module: str, extra: str) -> Any:
+def optional(module: str) -> Any:
     """Import a module of an optional package."""
     try:
         return importlib.import_module(module)

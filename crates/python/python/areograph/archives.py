@@ -40,7 +40,7 @@ def fetch(
         ``kind``, ``file``, ``url``, ``bytes``, ``md5``, ``status`` and ``why`` of every file. A file that failed has a
         status that begins with ``failed``. ``attrs["areograph"]["notes"]`` lists needs that no archive meets.
     """
-    pandas = optional("pandas", "geo")
+    pandas = optional("pandas")
     rows, notes = _native.fetch(
         os.fspath(site),
         None if into is None else os.fspath(into),

@@ -79,7 +79,7 @@ def load(label: StrPath, kernels: Paths | None = None, *, format: str = "isd") -
             file.write(f"[[images]]\nid = {_text(name)}\nlabel = {_text(path)}\n")
         # Its remarks concern the missing shots.
         try:
-            _native.run(site, out, False, None)
+            _native.run(site, out, False)
         except AreographError as error:
             # The site and its stages are those of this function alone.
             error.args = (re.sub(r"^image/[^:]*: ", "", str(error)),)
@@ -111,7 +111,7 @@ def orientation(image: Image, kernels: Paths | None = None, *, step_lines: float
         from the axes of the camera to those of the body; coordinates ``line`` (0 at the outer edge of the first line)
         and ``et_s``.
     """
-    xarray = optional("xarray", "xarray")
+    xarray = optional("xarray")
     if not step_lines > 0.0:
         raise UsageError(f"step_lines is {step_lines}; expected a number above 0")
     isd = load(cast(StrPath, image), kernels) if kernels is not None else _support(image)

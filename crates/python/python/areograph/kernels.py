@@ -45,7 +45,7 @@ def spacecraft_state(et: Any, kernels: Paths, *, frame: str = "IAU_MARS") -> Dat
     """
     if frame not in _FRAMES:
         raise UsageError(f"frame is {frame!r}; expected one of {', '.join(_FRAMES)}")
-    xarray, files = optional("xarray", "xarray"), kernels_at(kernels)
+    xarray, files = optional("xarray"), kernels_at(kernels)
     texts = _utc_texts(et)
     et_s = column(et, "et") if texts is None else column(_native.utc_to_et(texts, files))
     if not numpy.all(numpy.isfinite(et_s)):
@@ -74,7 +74,7 @@ def spacecraft_state(et: Any, kernels: Paths, *, frame: str = "IAU_MARS") -> Dat
 
 
 def compare_kernels(
-    a: Paths, b: Paths, *, t0: str | None = None, t1: str | None = None
+    a: Paths, b: Paths, *, t0: Any = None, t1: Any = None
 ) -> Dataset:
     """Compare the orbits and attitudes of two kernel sets: the deviation of each from the mean of both.
 
@@ -83,7 +83,7 @@ def compare_kernels(
     a, b
         Metakernels (``.tm``), or kernels in load order.
     t0, t1
-        First and last instant, UTC; by default all that both sets cover.
+        First and last instant, UTC as text or datetime; by default all that both sets cover.
 
     Returns
     -------
@@ -100,10 +100,12 @@ def compare_kernels(
     CoverageError
         If the sets have no common time.
     """
-    xarray = optional("xarray", "xarray")
+    xarray = optional("xarray")
     if (t0 is None) != (t1 is None):
         raise UsageError("only one of t0 and t1 is given; expected both, or none")
-    utc = None if t0 is None or t1 is None else [t0, t1]
+    utc = None if t0 is None else [utc_text(time) for time in (t0, t1)]
+    if utc is not None and None in utc:
+        raise UsageError(f"t0 and t1 are {t0!r} and {t1!r}; expected UTC as text or datetime")
     text, used = _native.compare_kernels([("a", kernels_at(a)), ("b", kernels_at(b))], utc)
     answer = json.loads(text)
     orbit, attitude = answer["orbit"], answer.get("attitude")

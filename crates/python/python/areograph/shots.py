@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy
 import pyarrow
+import pyarrow.compute
 
 from . import _native
 from ._common import (
@@ -85,12 +86,11 @@ def read_pedr(
     read = wanted if orbits is None or "orbit" in wanted else [*wanted, "orbit"]
     table, statement = _search(path, columns=read, check_all=True)
     if orbits is not None:
-        compute = optional("pyarrow.compute", "geo")
         try:
             members = pyarrow.array(sorted(set(orbits)), type=table.schema.field("orbit").type)
         except (pyarrow.ArrowException, OverflowError, TypeError):
             raise UsageError(f"orbits are {orbits!r}; expected orbit numbers") from None
-        table = table.filter(compute.is_in(table["orbit"], members))
+        table = table.filter(pyarrow.compute.is_in(table["orbit"], members))
         statement["orbits"] = members.to_pylist()
     table = table.select(wanted)
     metadata = {**(table.schema.metadata or {}), b"areograph": json.dumps(statement).encode()}
@@ -156,7 +156,7 @@ def search_shots(
     UserWarning
         If records with errors are omitted: shots may be missing.
     """
-    optional("geopandas", "geo")
+    optional("geopandas")
     names = [name for name in _native.shot_columns() if name != "geometry"]
     shot_filter = (
         list(classes),
@@ -196,7 +196,7 @@ def tracks(
         more than 2 s lie between two shots, and at 180 degrees of longitude. A part of a single shot has no line;
         profiles without any line have points.
     """
-    geopandas, shapely = optional("geopandas", "geo"), optional("shapely", "geo")
+    geopandas, shapely = optional("geopandas"), optional("shapely")
     names = ["et_tag_s", "orbit", "longitude_deg", "latitude_deg"]
     shot_filter = ([1], list(_CHANNELS), [0, 1], 90.0, [0.0, 360.0])
     time_s = _interval(t0, t1, leap_seconds)
@@ -263,7 +263,7 @@ def check_ranges(
     CoverageError
         If the kernels do not cover a shot.
     """
-    pandas = optional("pandas", "geo")
+    pandas = optional("pandas")
     lacking = [name for name in _native.RANGE_COLUMNS if name not in _names(shots)]
     if lacking:
         raise UsageError(
@@ -301,7 +301,7 @@ def _search(
     stated: dict[str, Any] = json.loads(statement)
     if not stated["complete"]:
         warnings.warn(
-            f"{stated['records_left_out']} records with errors are omitted with their shots; the first: "
+            f"{stated['records_left_out']} records with errors are omitted with their shots; the first complaint: "
             f"{stated['first_complaints'][0]}",
             UserWarning,
             stacklevel=3,
@@ -348,7 +348,7 @@ def _require_polygons(shape: dict[str, Any]) -> None:
 
 
 def _crs_of_shots() -> Any:
-    pyproj = optional("pyproj", "geo")
+    pyproj = optional("pyproj")
     return pyproj.CRS.from_user_input("IAU_2015:49900")
 
 
@@ -372,7 +372,7 @@ def _interval(t0: Time, t1: Time, leap_seconds: StrPath | None) -> list[float] |
 
 
 def _frame_of_points(table: pyarrow.Table, statement: dict[str, Any]) -> GeoDataFrame:
-    geopandas, shapely = optional("geopandas", "geo"), optional("shapely", "geo")
+    geopandas, shapely = optional("geopandas"), optional("shapely")
     height_m = table["radius_crossover_m"].to_numpy() - _SPHERE_M
     east_deg = _signed(table["longitude_deg"].to_numpy())
     points = shapely.points(east_deg, table["latitude_deg"].to_numpy(), height_m)

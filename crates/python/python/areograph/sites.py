@@ -100,7 +100,7 @@ def run(site: StrPath, *, out: StrPath = "out", force: bool = False) -> Result:
     UsageError, InputError, CoverageError, FileAccessError
         If the run fails; products of an earlier run remain unchanged.
     """
-    answer = _answer(_native.run(os.fspath(site), os.fspath(out), force, None))
+    answer = _answer(_native.run(os.fspath(site), os.fspath(out), force))
     return open_result(answer["folder"])
 
 

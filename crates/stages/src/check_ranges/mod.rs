@@ -26,7 +26,7 @@ use areograph_base::{
     error::{Cause, Result},
     footprints::{Footprint, Footprints},
     frames::BodyFixed,
-    time::{Et, Intervals},
+    time::{Et, Interval, Intervals},
     watch::Watch,
 };
 use areograph_config::RangeCheckConfig;
@@ -86,10 +86,11 @@ impl Stage for CheckRanges<'_> {
     fn run_watched(&self, watch: Watch<'_>) -> Result<RangeCheck> {
         let profiles = self.profiles.value()?;
         let reach_s = trajectory_reach_s(self.range_check, self.altimeter_clock);
+        let intervals: Vec<Interval> = profiles.iter().map(|profile| profile.interval).collect();
         check_ranges(
             &self.converted.value()?.footprints,
             profiles,
-            &trajectory(self.kernels.session()?, profiles, reach_s)?,
+            &trajectory(self.kernels.session()?, &intervals, reach_s)?,
             self.altimeter_clock,
             self.range_check,
             watch,
@@ -130,14 +131,15 @@ pub fn trajectory_reach_s(range_check: &RangeCheckConfig, altimeter_clock: &Mola
     range_check.scan_half_width_s + altimeter_clock.bias_s + TRAJECTORY_MARGIN_S
 }
 
-/// Tabulates the spacecraft's trajectory over all profiles, `reach_s` beyond them as far as the kernels go.
-fn trajectory(session: &Session, profiles: &[Profile], reach_s: f64) -> Result<Trajectory> {
-    for profile in profiles {
-        session.require_position(profile.interval)?;
+/// Tabulates the spacecraft's trajectory over these intervals, `reach_s` beyond them as far as the kernels go.
+///
+/// # Errors
+/// Kernels that do not cover an interval.
+pub fn trajectory(session: &Session, intervals: &[Interval], reach_s: f64) -> Result<Trajectory> {
+    for interval in intervals {
+        session.require_position(*interval)?;
     }
-    let reach = profiles
-        .iter()
-        .map(|profile| profile.interval.padded(reach_s));
+    let reach = intervals.iter().map(|interval| interval.padded(reach_s));
     let covered = Intervals::union_of(reach).intersection(&session.coverage()?.spk);
     session.trajectory(&covered, TRAJECTORY_TOLERANCE_M)
 }

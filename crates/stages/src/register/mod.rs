@@ -21,7 +21,7 @@ use super::{
 use areograph_base::{error::Result, footprints::Footprints, frames::BodyFixed, watch::Watch};
 use areograph_config::RegistrationConfig;
 use areograph_geom::{
-    ellipsoid::spherical_to_xyz_m,
+    ellipsoid::{is_above_horizon, spherical_to_xyz_m},
     pushbroom::{CameraModel, ExteriorOrientation, Projector, Unseen},
     statistics::Summary,
 };
@@ -236,8 +236,7 @@ impl OrientedImage<'_> {
     ) -> std::result::Result<PointOnImage, FootprintRejection> {
         let solution = projector.project(point_m)?;
         let pose = projector.model().pose(solution.x);
-        // Seen from the point, the camera must be above the horizon of a sphere through it.
-        if !(point_m.dot(&(pose.position_m - point_m)) > 0.0) {
+        if !is_above_horizon(&pose.position_m, point_m) {
             return Err(FootprintRejection::BeyondHorizon);
         }
         let focal_px = self.detector.focal_px(&pose.camera_vector_m(point_m));
