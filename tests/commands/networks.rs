@@ -14,7 +14,7 @@ use common::{
     mission::{products, site_run, succeed},
 };
 
-/// Products of Isidis with the network `name` of an earlier adjustment as tie points without those
+/// Products of Isidis with the network `name` of an earlier adjustment as tie points, but for those
 /// that state the hash of the configuration or of the file.
 fn adjusted_with(name: &str) -> BTreeMap<PathBuf, Vec<u8>> {
     let case = Case::pair();
