@@ -91,8 +91,9 @@ pub fn local_axes(place_m: &Vector3<f64>) -> Matrix3<f64> {
     ])
 }
 
-/// Whether a camera is above the horizon of the sphere through a point of a body, both body-fixed, metres: on the far side, a
-/// point lies on a ray of the camera too.
+/// Whether a camera is above the horizon of a point, on the sphere through the point; both body-fixed, metres.
+///
+/// The ray of a camera also passes through points of the far side, which the body hides.
 #[must_use]
 pub fn is_above_horizon(camera_m: &Vector3<f64>, point_m: &Vector3<f64>) -> bool {
     // False for NaN.
