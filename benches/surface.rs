@@ -25,6 +25,7 @@ use areograph::{
         match_laser::{MatchOptions, MatchRequest, match_laser},
     },
     store::hashes::HashCache,
+    watch::Watch,
 };
 use nalgebra::Vector3;
 use serde_json::Value;
@@ -49,7 +50,7 @@ fn timed<T>(run: impl Fn() -> T) -> (f64, T) {
 
 fn terrain_models(folder: &Path) {
     let scene = folder.join("lines");
-    write_calibration_loop_scene(&scene, 1).unwrap();
+    write_calibration_loop_scene(&scene, 1, Watch::from(&AtomicBool::new(false))).unwrap();
     let config = CalibrationConfig::load(&scene.join("calibration.toml"))
         .unwrap()
         .config;

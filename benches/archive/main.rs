@@ -44,6 +44,7 @@ use areograph::{
     scene::{ArchiveOptions, write_archive},
     spice::{KernelSet, Session},
     store::hashes::HashCache,
+    watch::Watch,
 };
 use rayon::prelude::*;
 use serde_json::{Value, json};
@@ -83,7 +84,12 @@ struct Archive {
 impl Archive {
     /// A synthetic archive with its kernels.
     fn write(folder: &Path, gb: f64) -> Self {
-        write_archive(folder, &ArchiveOptions::of_size(1, gb)).unwrap();
+        write_archive(
+            folder,
+            &ArchiveOptions::of_size(1, gb),
+            Watch::from(&AtomicBool::new(false)),
+        )
+        .unwrap();
         let folder = folder.join("pedr");
         let paths = Listing::below(&folder).paths;
         let sizes = paths.iter().map(|path| fs::metadata(path).unwrap().len());

@@ -4,25 +4,30 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{load_sites, output};
+use super::{load_sites, output, progress::Progress, stop::Signals};
 use crate::{
     error::{Error, Kind},
-    flow::{Checked, check_answer, check_out, check_site},
+    flow::{Checked, Extent, PUBLISH, RunOptions, check_answer, check_out, check_site},
     store::hashes::HashCache,
 };
 
-/// Checks configuration, files and kernel coverage; reports all errors that would stop a run, and all causes that would make its
-/// products invalid.
+/// Checks configuration, files and kernel coverage, and reports all errors that would stop a run.
+///
+/// The verdict is that of the products in --out, if they are up to date. With --full, the command otherwise computes every
+/// stage and reports all causes that would make products invalid.
 ///
 /// Examples:
 ///   areograph check sites/gusev.toml
-///   areograph check sites/*.toml --json
+///   areograph check sites --json
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
-    /// Site files (TOML).
+    /// Site files (TOML), folders or globs of them.
     #[arg(required = true, value_name = "SITE.toml")]
     sites: Vec<PathBuf>,
+    /// Compute every stage for the verdict of a run, unless products are up to date; nothing is written.
+    #[arg(long)]
+    full: bool,
     /// Folder of products of a run, which must be apart from the inputs; kernels that a run into it has read are not read
     /// again if they did not change.
     #[arg(long, default_value = "out")]
@@ -36,11 +41,30 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
-    let hashes = HashCache::in_folder(&arguments.out, arguments.rehash);
+    let (hashes, signals) = (
+        HashCache::in_folder(&arguments.out, arguments.rehash),
+        Signals::heard()?,
+    );
+    let extent = if arguments.full {
+        Extent::Full
+    } else {
+        Extent::Inputs
+    };
     let mut failures = Vec::new();
     let mut answers = Vec::new();
     for site in load_sites(&arguments.sites)? {
-        let mut checked = check_site(&site, &hashes);
+        let progress = Progress::of_work(&site.site);
+        let options = RunOptions {
+            out: arguments.out.clone(),
+            until: PUBLISH,
+            force: false,
+            stop: signals.stop(),
+            hashes: &hashes,
+            roots: &[],
+            observer: &progress,
+        };
+        let mut checked = check_site(&site, extent, &options);
+        drop(progress);
         let out = check_out(&arguments.out, std::slice::from_ref(&site));
         checked.failures.splice(0..0, out.err());
         if arguments.json {
@@ -73,9 +97,17 @@ fn print(site: &str, checked: &Checked) {
         output::line(format_args!("  {finding}"));
     }
     let Some(verdict) = &checked.verdict else {
+        if checked.failures.is_empty() {
+            output::line("  verdict: not computed; --full computes it, as a run does");
+        }
         return;
     };
-    output::line(format_args!("  a run would be {}", verdict.word()));
+    let word = verdict.word();
+    output::line(if checked.has_products {
+        format!("  products are up to date and {word}")
+    } else {
+        format!("  a run would be {word}")
+    });
     for remark in &verdict.remarks {
         output::line(format_args!("  {remark}"));
     }

@@ -8,9 +8,11 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 
 use self::wish::needs;
-use super::{stop::Signals, windows::edges};
+use super::{
+    stop::Signals,
+    windows::{BoxMeaning, edges},
+};
 use crate::{
-    config::window_of_box,
     error::{Error, Kind as ErrorKind, Result},
     fetch::{
         Archives, FetchError, Filling, Outcome,
@@ -40,7 +42,7 @@ use crate::{
 #[command(verbatim_doc_comment)]
 #[allow(clippy::struct_excessive_bools, reason = "command-line switches")]
 pub(super) struct Arguments {
-    /// Site files (TOML); their inputs may be missing.
+    /// Site files (TOML), folders or globs of them; their inputs may be missing.
     #[arg(value_name = "SITE.toml")]
     sites: Vec<PathBuf>,
     /// Folder of fetch.json and of copies of the indexes; also of the files that no site file places. By default the
@@ -53,9 +55,12 @@ pub(super) struct Arguments {
     /// First and last day for kernels and laser files.
     #[arg(long, value_name = "DAY,DAY", value_parser = wish::days)]
     dates: Vec<[crate::fetch::Utc; 2]>,
-    /// West, east, south and north edge, degrees: a table of the shots in this box, from the Orbital Data Explorer.
-    #[arg(long = "box", value_name = "W,E,S,N", value_parser = box_of_shots, allow_hyphen_values = true)]
+    /// West, east, south and north edge, degrees (longitudes -360 to 360): a table of the shots in this box, from the
+    /// Orbital Data Explorer.
+    #[arg(long = "box", value_name = "W,E,S,N", value_parser = edges, allow_hyphen_values = true)]
     edges_deg: Option<[f64; 4]>,
+    #[command(flatten)]
+    meaning: BoxMeaning,
     /// Fetch the latest leap seconds of NAIF's generic kernels into this folder.
     #[arg(long, value_name = "DIR")]
     generic_kernels: Option<PathBuf>,
@@ -99,13 +104,6 @@ enum Kind {
     Images,
     /// Tables of shots of windows.
     Shots,
-}
-
-/// Edges of a box, which must be one.
-fn box_of_shots(text: &str) -> std::result::Result<[f64; 4], String> {
-    let [west, east, south, north] = edges(text)?;
-    window_of_box("box", [west, east, south, north]).map_err(|error| error.to_string())?;
-    Ok([west, east, south, north])
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<()> {

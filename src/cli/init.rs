@@ -1,19 +1,23 @@
 //! `areograph init`.
 
+mod answers;
 mod place;
 mod tables;
 
 use std::{
     fs,
-    io::{self, IsTerminal as _, Write as _},
     path::{Component, Path, PathBuf},
 };
 
 use clap::Args;
 
-use super::{output, windows::edges};
+use self::answers::Answers;
+use super::{
+    output,
+    windows::{BoxMeaning, edges},
+};
 use crate::{
-    config::{Document as _, NewSite, SiteConfig, built_in_instruments},
+    config::{Document as _, SITE_IDENTIFIER, SiteConfig, built_in_instruments},
     error::{Cause, Error, IoError, Locate as _},
     files::file_name,
     pds::{product_named, read_label},
@@ -28,8 +32,8 @@ use crate::{
 ///
 /// Examples:
 ///   areograph init gale
-///   areograph init gale --box 137.0,138.0,-5.5,-4.0 --kernels kernels/nav.tm --pedr 'pedr/*.b'
-///   areograph init gale --label labels/e0202855.lbl --label labels/m0402852.lbl --kernels kernels --ties gale.csv
+///   areograph init gale --box 137.0,138.0,-5.5,-4.0 --kernels kernels/nav.tm --pedr pedr
+///   areograph init gale --label labels/e0202855.lbl labels/m0402852.lbl --kernels kernels --ties gale.csv
 ///   areograph init gusev --shots 'gusev/*.csv' --kernels naif0012.tls
 ///   areograph init gale --place gale --pairs 2    # then: areograph fetch gale/gale.toml
 #[derive(Debug, Args)]
@@ -44,24 +48,26 @@ pub(super) struct Arguments {
     /// Free text for the report.
     #[arg(long, value_name = "TEXT")]
     description: Option<String>,
-    /// West, east, south and north edge of the window, degrees: east longitude and areocentric latitude.
+    /// West, east, south and north edge of the window, degrees (longitudes -360 to 360).
     #[arg(long = "box", value_name = "W,E,S,N", value_parser = edges, allow_hyphen_values = true)]
     edges_deg: Option<[f64; 4]>,
+    #[command(flatten)]
+    meaning: BoxMeaning,
     /// A metakernel (.tm), a folder of kernels to choose from, or kernels in load order.
-    #[arg(long, value_name = "PATH")]
+    #[arg(long, value_name = "PATH", num_args = 1..)]
     kernels: Vec<PathBuf>,
-    /// PEDR files, or globs of them.
-    #[arg(long, value_name = "GLOB")]
+    /// PEDR files, folders or globs of them.
+    #[arg(long, value_name = "PATH", num_args = 1..)]
     pedr: Vec<PathBuf>,
-    /// Shot tables from the Orbital Data Explorer, or globs of them; with --place, the tables that `areograph fetch`
-    /// requests, in place of PEDR files.
-    #[arg(long, value_name = "GLOB", conflicts_with = "pedr")]
+    /// Shot tables from the Orbital Data Explorer, folders or globs of them; with --place, the tables that
+    /// `areograph fetch` requests, in place of PEDR files.
+    #[arg(long, value_name = "PATH", num_args = 1.., conflicts_with = "pedr")]
     shots: Vec<PathBuf>,
-    /// Label of an image.
-    #[arg(long = "label", value_name = "FILE")]
+    /// Labels of images, folders or globs of them.
+    #[arg(long = "label", value_name = "PATH", num_args = 1..)]
     labels: Vec<PathBuf>,
-    /// Tie point files, or globs of them.
-    #[arg(long, value_name = "GLOB")]
+    /// Tie point files, folders or globs of them.
+    #[arg(long, value_name = "PATH", num_args = 1..)]
     ties: Vec<PathBuf>,
     #[command(flatten)]
     place: place::PlaceArguments,
@@ -77,6 +83,12 @@ enum Refused {
     #[error("missing: {0}")]
     #[cause("give the options of `areograph init --help`, or answer on a terminal")]
     Missing(&'static str),
+    #[error("the identifier of the site is {0:?}; expected {SITE_IDENTIFIER}")]
+    #[cause("give such an identifier with --site")]
+    Identifier(String),
+    #[error("{0}")]
+    #[cause("write the edges as 137.0,138.0,-5.5,-4.0")]
+    Edges(String),
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
@@ -85,7 +97,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
         return place::run(arguments, &folder);
     }
     let answers = Answers::of(arguments, &file_name(&folder))?;
-    answers.complete()?;
     let file = arguments.folder.join(format!("{}.toml", answers.site));
     if file.exists() {
         return Err(Refused::Exists).in_file(file);
@@ -109,19 +120,9 @@ fn in_new_folder(folder: &Path, work: impl FnOnce() -> Result<(), Error>) -> Res
 
 /// Checks and writes the site file.
 fn write(answers: &Answers, folder: &Path, file: &Path) -> Result<(), Error> {
-    let mut site = answers.new_site(folder)?;
-    // Checked as the future file, so that paths are relative to its folder.
-    if answers.is_placed_by_tables() {
-        site.edges_deg = Some([0.0, 360.0, -90.0, 90.0]);
-        let anywhere = SiteConfig::parse(&site.text(), file)?.config;
-        let read: Vec<PathBuf> = anywhere
-            .shots
-            .into_iter()
-            .flat_map(|table| table.files)
-            .collect();
-        site.edges_deg = Some(tables::box_around_deg(&read)?);
-    }
+    let site = answers.new_site(folder)?;
     let text = site.text();
+    // Checked as the future file, so that paths are relative to its folder.
     let loaded = SiteConfig::parse(&text, file)?;
     for warning in loaded.warnings {
         tracing::warn!("{warning}");
@@ -133,118 +134,6 @@ fn write(answers: &Answers, folder: &Path, file: &Path) -> Result<(), Error> {
         file.display()
     ));
     Ok(())
-}
-
-/// Options and answers, with paths relative to the current folder.
-struct Answers {
-    site: String,
-    description: String,
-    edges_deg: Option<[f64; 4]>,
-    kernels: Vec<PathBuf>,
-    pedr: Vec<PathBuf>,
-    shots: Vec<PathBuf>,
-    labels: Vec<PathBuf>,
-    ties: Vec<PathBuf>,
-}
-
-impl Answers {
-    /// Options, completed by answers on a terminal.
-    fn of(arguments: &Arguments, name: &str) -> Result<Self, Error> {
-        let mut answers = Self {
-            site: arguments.site.clone().unwrap_or_else(|| identifier(name)),
-            description: arguments.description.clone().unwrap_or_default(),
-            edges_deg: arguments.edges_deg,
-            kernels: arguments.kernels.clone(),
-            pedr: arguments.pedr.clone(),
-            shots: arguments.shots.clone(),
-            labels: arguments.labels.clone(),
-            ties: arguments.ties.clone(),
-        };
-        if !(io::stdin().is_terminal() && io::stderr().is_terminal()) {
-            return Ok(answers);
-        }
-        if arguments.site.is_none() {
-            let answer = answer(&format!("Identifier of the site [{}]", answers.site))?;
-            if !answer.is_empty() {
-                answers.site = answer;
-            }
-        }
-        let questions = [
-            (
-                "Kernels: a metakernel, a folder, or files in load order",
-                &mut answers.kernels,
-            ),
-            ("PEDR files or globs [none]", &mut answers.pedr),
-            (
-                "Shot tables from the Orbital Data Explorer, or globs [none]",
-                &mut answers.shots,
-            ),
-            ("Image labels [none]", &mut answers.labels),
-            ("Tie point files [none]", &mut answers.ties),
-        ];
-        for (question, paths) in questions {
-            if paths.is_empty() {
-                let answer = answer(question)?;
-                paths.extend(answer.split_whitespace().map(PathBuf::from));
-            }
-        }
-        while answers.edges_deg.is_none() && !answers.pedr.is_empty() {
-            let answer =
-                answer("Window west,east,south,north in degrees [the area that the images cover]")?;
-            if answer.is_empty() {
-                break;
-            }
-            match edges(&answer) {
-                Ok(edges_deg) => answers.edges_deg = Some(edges_deg),
-                Err(problem) => tell(&format!("{problem}\n"))?,
-            }
-        }
-        Ok(answers)
-    }
-
-    /// Checks that the input suffices for a site.
-    fn complete(&self) -> Result<(), Refused> {
-        if self.kernels.is_empty() {
-            return Err(Refused::Missing("kernels (--kernels)"));
-        }
-        if self.pedr.is_empty() && self.shots.is_empty() && self.labels.is_empty() {
-            return Err(Refused::Missing(
-                "shots or images of the site (--pedr, --shots, --label)",
-            ));
-        }
-        if !self.pedr.is_empty() && self.edges_deg.is_none() && self.labels.is_empty() {
-            return Err(Refused::Missing(
-                "the window of the site (--box, or images with --label)",
-            ));
-        }
-        Ok(())
-    }
-
-    /// Whether the window is the box around the shots of tables.
-    fn is_placed_by_tables(&self) -> bool {
-        !self.shots.is_empty() && self.edges_deg.is_none() && self.labels.is_empty()
-    }
-
-    /// The new site with paths relative to `folder`.
-    fn new_site(&self, folder: &Path) -> Result<NewSite, Error> {
-        let seen = |paths: &[PathBuf]| seen(folder, paths);
-        let mut images = Vec::with_capacity(self.labels.len());
-        for (label, seen) in self.labels.iter().zip(seen(&self.labels)?) {
-            images.push((image_of(label)?, seen));
-        }
-        Ok(NewSite {
-            site: self.site.clone(),
-            description: self.description.clone(),
-            kernels: seen(&self.kernels)?,
-            kernels_are_a_folder: matches!(&self.kernels[..], [one] if one.is_dir()),
-            pedr: seen(&self.pedr)?,
-            shots: seen(&self.shots)?,
-            edges_deg: self.edges_deg,
-            images,
-            ties: seen(&self.ties)?,
-            ..NewSite::default()
-        })
-    }
 }
 
 /// The identifier of an image: the product identifier of its label, such as `E02-02855`, else the file name.
@@ -306,24 +195,6 @@ fn seen(folder: &Path, paths: &[PathBuf]) -> Result<Vec<PathBuf>, Error> {
         .iter()
         .map(|path| Ok(seen_from(folder, &absolute(path)?)));
     paths.collect()
-}
-
-fn tell(text: &str) -> Result<(), Error> {
-    let mut terminal = io::stderr().lock();
-    let told = terminal
-        .write_all(text.as_bytes())
-        .and_then(|()| terminal.flush());
-    Ok(told.map_err(IoError::on("write to the terminal"))?)
-}
-
-/// The answer to a question, without spaces around it; empty at the end of the input.
-fn answer(question: &str) -> Result<String, Error> {
-    tell(&format!("{question}: "))?;
-    let mut line = String::new();
-    io::stdin()
-        .read_line(&mut line)
-        .map_err(IoError::on("read from the terminal"))?;
-    Ok(line.trim().to_owned())
 }
 
 #[cfg(test)]

@@ -35,7 +35,7 @@ enum Command {
 
 #[derive(Debug, Args)]
 struct Files {
-    /// One metakernel (.tm), or kernels in load order.
+    /// One metakernel (.tm), a folder of kernels, or kernels in load order.
     #[arg(required = true, value_name = "KERNEL")]
     files: Vec<PathBuf>,
     /// Print JSON.

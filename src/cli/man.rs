@@ -23,12 +23,15 @@ const PAGE: Mark = Mark {
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
-    /// Folder of the pages; it must exist.
+    /// Folder of the pages; it is created if necessary.
     directory: PathBuf,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<()> {
     let directory = &arguments.directory;
+    fs::create_dir_all(directory)
+        .map_err(IoError::on("create the folder"))
+        .in_file(directory)?;
     let generated = || {
         let draft = PartialFolder::new_in(directory)?;
         clap_mangen::generate_to(Cli::command(), draft.path())?;

@@ -6,6 +6,7 @@ mod compare_readings;
 mod completions;
 mod export;
 mod fetch;
+mod files;
 mod image;
 mod init;
 mod kernels;
@@ -45,7 +46,7 @@ use crate::{
 
 /// Mars Global Surveyor data preparation: SPICE kernels, MOLA shots and MOC images to validated products.
 ///
-/// Exit codes: 0 done, 1 bug in areograph, 2 usage or configuration, 3 input data, 4 kernel coverage,
+/// Exit codes: 0 done, 1 bug in areograph, 2 usage or configuration, 3 input data missing or invalid, 4 kernel coverage,
 /// 5 products written but invalid, or moved beyond a limit, 6 input/output, 130 interrupted.
 #[derive(Debug, Parser)]
 #[command(
@@ -55,18 +56,27 @@ use crate::{
     after_help = "Example: areograph run sites/gusev.toml --out products"
 )]
 struct Cli {
-    /// Print errors only.
-    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    /// Print results and errors, but no progress and no warnings.
+    #[arg(short, long, global = true, conflicts_with = "verbose", help_heading = GENERAL)]
     quiet: bool,
     /// Print the log; given twice, in detail.
-    #[arg(short, long, global = true, action = ArgAction::Count)]
+    #[arg(short, long, global = true, action = ArgAction::Count, help_heading = GENERAL)]
     verbose: u8,
     /// Print the log in this form.
-    #[arg(long, global = true, value_name = "FORM", conflicts_with = "quiet")]
+    #[arg(
+        long,
+        global = true,
+        value_name = "FORM",
+        conflicts_with = "quiet",
+        help_heading = GENERAL
+    )]
     log: Option<LogForm>,
     #[command(subcommand)]
     command: Command,
 }
+
+/// Heading of options that every command has.
+const GENERAL: &str = "Options of all commands";
 
 /// How the log is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -151,12 +161,13 @@ fn log(cli: &Cli) {
     let as_json = match &cli.command {
         // Its log is read by the service.
         Command::Worker(_) => true,
-        Command::Serve(arguments) => arguments.log_json,
-        Command::Nightly(arguments) => arguments.log_json,
         _ => false,
     } || cli.log == Some(LogForm::Json);
     if as_json {
         log.json().flatten_event(true).init();
+    } else if level == LevelFilter::WARN {
+        // Warnings of a command that a person runs.
+        log.without_time().with_ansi(false).init();
     } else {
         let terminal = std::io::IsTerminal::is_terminal(&std::io::stderr());
         let colour = std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
@@ -215,12 +226,13 @@ fn load<T: Document>(path: &Path) -> Result<T, Error> {
     Ok(loaded.config)
 }
 
-/// Loads site files; every problem of every file is reported before the first failure is returned.
+/// Loads site files, also of folders and globs; every problem of every file is reported before the first failure is
+/// returned.
 fn load_sites(paths: &[PathBuf]) -> Result<Vec<SiteConfig>, Error> {
     let mut sites = Vec::with_capacity(paths.len());
     let mut first_failure = None;
-    for path in paths {
-        match load(path) {
+    for path in files::expand(paths, &files::CONFIGURATIONS)? {
+        match load(&path) {
             Ok(site) => sites.push(site),
             Err(failure) => {
                 if let Some(earlier) = first_failure.replace(failure) {

@@ -32,9 +32,6 @@ const JOBS_MAX: u32 = 100_000;
 pub(super) struct Arguments {
     /// Configuration of the service (TOML).
     config: PathBuf,
-    /// Log as JSON, one object per line.
-    #[arg(long)]
-    pub(super) log_json: bool,
 }
 
 pub(super) fn run(arguments: &Arguments) -> ExitCode {

@@ -7,16 +7,18 @@ use std::{
 };
 
 use clap::Args;
+use tracing::level_filters::LevelFilter;
 
-use super::{load, load_sites, output};
+use super::{files, load, load_sites, output};
 use crate::{
     config::{CalibrationConfig, NetConfig},
     error::Error,
-    flow::{PUBLISH, RunOptions, Task, check_out, plan_answer, plan_task},
+    flow::{PUBLISH, RunOptions, StageReason, Task, check_out, plan_answer, plan_task},
+    stage::Reason,
     store::hashes::HashCache,
 };
 
-/// Lists the stages that would run, with the reasons.
+/// States how many stages would run, and why; with -v for each stage.
 ///
 /// Examples:
 ///   areograph plan sites/gusev.toml --out products
@@ -25,7 +27,7 @@ use crate::{
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
-    /// Site, net and calibration files (TOML).
+    /// Site, net and calibration files (TOML), folders or globs of them.
     #[arg(required = true, value_name = "FILE.toml")]
     files: Vec<PathBuf>,
     /// Folder of the products.
@@ -38,6 +40,9 @@ pub(super) struct Arguments {
     #[arg(long)]
     json: bool,
 }
+
+/// Causes that the sentence of a plan states.
+const CAUSES_MAX: usize = 5;
 
 /// Files by the flow that they describe.
 #[derive(Default)]
@@ -72,7 +77,7 @@ fn has_key(path: &Path, key: &str) -> bool {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
-    let files = Files::of(&arguments.files)?;
+    let files = Files::of(&files::expand(&arguments.files, &files::CONFIGURATIONS)?)?;
     let sites = load_sites(&files.sites)?;
     check_out(&arguments.out, &sites)?;
     let options = RunOptions {
@@ -90,6 +95,43 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     print(&tasks.collect::<Vec<_>>(), &options, arguments.json)
 }
 
+/// How many stages would run, and the causes: reasons that are not changes of other outputs.
+fn sentence(stages: &[StageReason]) -> String {
+    let run: Vec<&Reason> = stages
+        .iter()
+        .map(|stage| &stage.reason)
+        .filter(|reason| reason.runs())
+        .collect();
+    if run.is_empty() {
+        return format!(
+            "nothing changed; a run would keep all {} stages",
+            stages.len()
+        );
+    }
+    let mut causes: Vec<String> = Vec::new();
+    for reason in &run {
+        let stated = match reason {
+            Reason::Changed(inputs) => inputs.clone(),
+            other => vec![other.to_string()],
+        };
+        let is_cause =
+            |cause: &String| !cause.starts_with("output of ") && !cause.starts_with("inputs of ");
+        for cause in stated.into_iter().filter(is_cause) {
+            if !causes.contains(&cause) {
+                causes.push(cause);
+            }
+        }
+    }
+    let more = causes.len().saturating_sub(CAUSES_MAX);
+    causes.truncate(CAUSES_MAX);
+    if more > 0 {
+        causes.push(format!("{more} more causes (-v)"));
+    }
+    let (run, all) = (run.len(), stages.len());
+    let verb = if run == 1 { "stage" } else { "stages" };
+    format!("{run} of {all} {verb} would run: {}", causes.join(", "))
+}
+
 /// Prints the plan of every task.
 pub(super) fn print(
     tasks: &[Task<'_>],
@@ -103,7 +145,10 @@ pub(super) fn print(
             answers.push(plan_answer(*task, &plan));
             continue;
         }
-        output::line(format_args!("{}:", task.name()));
+        output::line(format_args!("{}: {}", task.name(), sentence(&plan.stages)));
+        if LevelFilter::current() < LevelFilter::INFO {
+            continue;
+        }
         for planned in plan.stages {
             let word = if planned.reason.runs() {
                 "run "

@@ -1,10 +1,15 @@
-//! Progress of a run: on a terminal a live line for each site, net, calibration, match or archive; elsewhere a line for
-//! each stage, and lines at intervals during long stages.
+//! Progress of commands that take time: on a terminal a live line for each site, net, calibration, match or archive;
+//! elsewhere lines at intervals.
 
 use std::{
     fmt,
     io::{self, IsTerminal as _, Write},
-    sync::{LazyLock, Mutex, PoisonError},
+    sync::{
+        Arc, LazyLock, Mutex, PoisonError,
+        atomic::AtomicBool,
+        mpsc::{self, RecvTimeoutError, Sender},
+    },
+    thread::{self, JoinHandle},
     time::{Duration, Instant},
 };
 
@@ -14,7 +19,7 @@ use tracing_subscriber::fmt::MakeWriter;
 
 use crate::{
     flow::{Observer, PUBLISH, StageEvent, Task},
-    watch::Count,
+    watch::{Count, Counter, Watch},
 };
 
 /// The live lines of the program, on standard error; nothing is drawn if that is not a terminal.
@@ -22,8 +27,12 @@ static LINES: LazyLock<MultiProgress> = LazyLock::new(MultiProgress::new);
 /// Template of a live line: site, stages done of all, time elapsed and time left, and as much of the stage as fits. A
 /// bar would break the line on a terminal of 40 columns.
 const LINE: &str = "{prefix:.bold}  {pos}/{len}  {elapsed}{left}  {wide_msg}";
-/// Interval of progress lines during long stages where there is no live line.
-const TOLD_EVERY: Duration = Duration::from_secs(10);
+/// The same where the number of stages is unknown.
+const LINE_OF_WORK: &str = "{prefix:.bold}  {elapsed}  {wide_msg}";
+/// Interval of progress lines where there is no live line.
+const LINE_EVERY: Duration = Duration::from_secs(10);
+/// Work that takes at least this time ends with a line that states it, seconds.
+const TIME_FROM_S: f64 = 2.0;
 /// Interval at which the time on a live line is redrawn.
 const TICK: Duration = Duration::from_millis(200);
 
@@ -49,40 +58,111 @@ impl Write for Log {
     }
 }
 
-/// Progress of a run.
+/// Progress of a run, or of another command that takes time.
 #[derive(Debug)]
 pub(super) struct Progress {
     name: String,
+    begun: Instant,
     line: ProgressBar,
     counted: Mutex<Option<Counted>>,
-    /// Whether each stage has a separate line.
-    plain: bool,
+    /// Where there is no live line.
+    lines: Option<Lines>,
+    is_shown: bool,
 }
 
 impl Progress {
     /// Progress of a new run. Nothing is shown with `--verbose`, since the log reports stages, or with `--quiet`.
     pub(super) fn of(task: Task<'_>) -> Self {
+        Self::shown(task.name(), LINE, task.stage_count() as u64)
+    }
+
+    /// Progress of other work, which need not have stages.
+    pub(super) fn of_work(name: &str) -> Self {
+        Self::shown(name, LINE_OF_WORK, 0)
+    }
+
+    fn shown(name: &str, template: &str, stages: u64) -> Self {
         let level = LevelFilter::current();
-        let told = level >= LevelFilter::WARN && level < LevelFilter::INFO;
+        let is_shown = level >= LevelFilter::WARN && level < LevelFilter::INFO;
         let terminal = io::stderr().is_terminal();
-        let line = if told && terminal {
-            let line = LINES.add(ProgressBar::new(task.stage_count() as u64));
+        let line = if is_shown && terminal {
+            let line = LINES.add(ProgressBar::new(stages));
             // If the library rejects the template, its default remains.
-            if let Ok(style) = ProgressStyle::with_template(LINE) {
+            if let Ok(style) = ProgressStyle::with_template(template) {
                 line.set_style(style.with_key("left", left));
             }
-            line.set_prefix(task.name().to_owned());
+            line.set_prefix(name.to_owned());
             line.enable_steady_tick(TICK);
             line
         } else {
             ProgressBar::hidden()
         };
         Self {
-            name: task.name().to_owned(),
+            name: name.to_owned(),
+            begun: Instant::now(),
             line,
             counted: Mutex::new(None),
-            plain: told && !terminal,
+            lines: (is_shown && !terminal).then(|| Lines::of(name)),
+            is_shown,
         }
+    }
+
+    /// Does work that counts its steps, which are shown.
+    pub(super) fn watch<T>(&self, what: &str, work: impl FnOnce(Watch<'_>) -> T) -> T {
+        let count = |count| self.count(what, count);
+        let counter = Counter::new(&count);
+        self.show(what.to_owned());
+        // The command ends at a signal: what it writes appears whole or not at all.
+        work(Watch::counted(&AtomicBool::new(false), &counter))
+    }
+
+    fn show(&self, text: String) {
+        if let Some(lines) = &self.lines {
+            lines.show(&text);
+        }
+        self.line.set_message(text);
+    }
+}
+
+/// A thread that prints the present state at intervals.
+#[derive(Debug)]
+struct Lines {
+    text: Arc<Mutex<String>>,
+    /// Ends the thread when it is dropped.
+    end: Option<Sender<()>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Lines {
+    fn of(name: &str) -> Self {
+        let text = Arc::new(Mutex::new(String::new()));
+        let (end, ended) = mpsc::channel();
+        let (name, shown) = (name.to_owned(), Arc::clone(&text));
+        let thread = thread::spawn(move || {
+            while ended.recv_timeout(LINE_EVERY) == Err(RecvTimeoutError::Timeout) {
+                let text = shown.lock().unwrap_or_else(PoisonError::into_inner);
+                // A closed standard error is not a failure.
+                let _ = writeln!(io::stderr().lock(), "{name}: {text}");
+            }
+        });
+        Self {
+            text,
+            end: Some(end),
+            thread: Some(thread),
+        }
+    }
+
+    fn show(&self, text: &str) {
+        let mut shown = self.text.lock().unwrap_or_else(PoisonError::into_inner);
+        text.clone_into(&mut shown);
+    }
+}
+
+impl Drop for Lines {
+    fn drop(&mut self) {
+        self.end.take();
+        // It ends at once, and does not fail.
+        let _ = self.thread.take().map(JoinHandle::join);
     }
 }
 
@@ -98,13 +178,7 @@ fn left(state: &ProgressState, out: &mut dyn fmt::Write) {
 impl Observer for Progress {
     fn hear(&self, stage: &str, event: &StageEvent<'_>) {
         match event {
-            StageEvent::Begins(_) => {
-                self.line.set_message(stage.to_owned());
-                if self.plain {
-                    // A closed standard error is not a failure.
-                    let _ = writeln!(io::stderr().lock(), "{}: {stage}", self.name);
-                }
-            }
+            StageEvent::Begins(_) => self.show(stage.to_owned()),
             StageEvent::Counts(count) => self.count(stage, *count),
             StageEvent::Kept | StageEvent::Done(_) => {
                 self.line.inc(1);
@@ -123,33 +197,25 @@ struct Counted {
     stage: String,
     of: &'static str,
     begun: Instant,
-    told: Instant,
 }
 
 impl Progress {
     /// Reports the progress of a stage; called from any thread.
     fn count(&self, stage: &str, count: Count) {
         let mut counted = self.counted.lock().unwrap_or_else(PoisonError::into_inner);
-        let now = Instant::now();
         // Files are hashed for a stage before it counts its steps.
         let same = |before: &Counted| before.stage == stage && before.of == count.of;
         if !counted.as_ref().is_some_and(same) {
             *counted = Some(Counted {
                 stage: stage.to_owned(),
                 of: count.of,
-                begun: now,
-                told: now,
+                begun: Instant::now(),
             });
         }
         let Some(counted) = counted.as_mut() else {
             return;
         };
-        let words = words(stage, count, counted.begun.elapsed());
-        if self.plain && counted.told.elapsed() >= TOLD_EVERY {
-            counted.told = now;
-            let _ = writeln!(io::stderr().lock(), "{}: {words}", self.name);
-        }
-        self.line.set_message(words);
+        self.show(words(stage, count, counted.begun.elapsed()));
     }
 }
 
@@ -181,6 +247,11 @@ pub(super) fn duration(seconds: f64) -> String {
 impl Drop for Progress {
     fn drop(&mut self) {
         self.line.finish_and_clear();
+        let taken_s = self.begun.elapsed().as_secs_f64();
+        if self.is_shown && taken_s >= TIME_FROM_S {
+            // A closed standard error is not a failure.
+            let _ = writeln!(io::stderr().lock(), "{}: {taken_s:.1} s", self.name);
+        }
     }
 }
 

@@ -42,6 +42,9 @@ pub(super) struct Arguments {
     /// Write the page to this file, and leave the products unchanged; its folder must exist.
     #[arg(long, value_name = "FILE.html")]
     page: Option<PathBuf>,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
     /// Open the page in the browser.
     #[arg(long)]
     open: bool,
@@ -114,7 +117,11 @@ fn again(folder: &Path, arguments: &Arguments) -> Result<u8, Error> {
         }
         _ => again.put_back()?,
     };
-    output::line(format_args!("{}: {}", again.site, path.display()));
+    if arguments.json {
+        output::json(&json!({"site": again.site, "page": path}));
+    } else {
+        output::line(format_args!("{}: {}", again.site, path.display()));
+    }
     if arguments.open {
         open::page(&path);
     }

@@ -27,7 +27,7 @@ use crate::{
         run_answer, run_site,
     },
     products::REPORT,
-    store::hashes::HashCache,
+    store::{hashes::HashCache, manifest::Manifest},
 };
 
 /// Runs sites from kernels to validated products in `<out>/<site>`.
@@ -41,7 +41,7 @@ use crate::{
 #[derive(Debug, Clone, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
-    /// Site files (TOML).
+    /// Site files (TOML), folders or globs of them.
     #[arg(required = true, value_name = "SITE.toml")]
     sites: Vec<PathBuf>,
     /// Output folder; each site is written to a subfolder.
@@ -98,7 +98,7 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
         return report(&failure);
     }
     let hashes = HashCache::in_folder(&arguments.out, arguments.flags.rehash);
-    if arguments.flags.dry_run {
+    if arguments.flags.plan {
         let never = AtomicBool::new(false);
         let options = arguments.options(&never, &hashes, &());
         let tasks: Vec<Task<'_>> = sites.iter().map(Task::Site).collect();
@@ -216,6 +216,7 @@ fn print_outcome(outcome: &RunOutcome) {
         "{site}: {}; {what} in {folder}, see report/index.html",
         verdict.word()
     ));
+    output::line(format_args!("  {}", contents(manifest)));
     for reason in verdict.reasons.iter().chain(&verdict.remarks) {
         output::line(format_args!("  {reason}"));
     }
@@ -223,6 +224,33 @@ fn print_outcome(outcome: &RunOutcome) {
         output::line(format_args!("  {check}"));
     }
     untested(verdict);
+}
+
+/// The content of the products in numbers, and the principal file.
+fn contents(manifest: &Manifest) -> String {
+    let count = |name: &str| manifest.counts.get(name).copied().unwrap_or(0);
+    let mut parts = Vec::new();
+    if count("footprints") > 0 {
+        let (footprints, profiles) = (count("footprints"), count("profiles"));
+        parts.push(format!("{footprints} footprints of {profiles} profiles"));
+    }
+    if count("images") > 0 {
+        parts.push(format!("{} images", count("images")));
+    }
+    if count("registered") > 0 {
+        let (inside, all) = (count("registered_inside"), count("registered"));
+        parts.push(format!(
+            "{inside} of {all} registered places inside an image"
+        ));
+    }
+    let has = |name: &&&str| {
+        let mut products = manifest.products.iter();
+        products.any(|product| product.path == ***name)
+    };
+    let principal = ["registered_footprints.parquet", "footprints.parquet"];
+    let file = principal.iter().find(has);
+    let file = file.map_or_else(String::new, |file| format!("; see {file}"));
+    format!("{}{file}", parts.join(", "))
 }
 
 /// The report of the only site that has products, or the page over all of them.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
 
-use super::output;
+use super::{output, progress::Progress};
 use crate::{
     error::Error,
     scene::{
@@ -13,6 +13,7 @@ use crate::{
         write_scene_along, write_scene_with_images, write_terrain_model_scene,
     },
     units::SECONDS_PER_DAY,
+    watch::Watch,
 };
 
 /// Writes synthetic input with known truth: a mission, a net, a calibration, a terrain model or an archive.
@@ -237,16 +238,18 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
             Ok(())
         }
         Command::Calibration(CalibrationArguments { target, images }) => {
-            let write = if *images {
-                write_calibration_loop_scene
+            let (directory, seed) = (&target.directory, target.seed);
+            output::line(if *images {
+                working(|watch| write_calibration_loop_scene(directory, seed, watch))?
             } else {
-                write_calibration_scene
-            };
-            output::line(write(&target.directory, target.seed)?);
+                write_calibration_scene(directory, seed)?
+            });
             Ok(())
         }
         Command::TerrainModel(TerrainModelArguments { target }) => {
-            output::line(write_terrain_model_scene(&target.directory, target.seed)?);
+            output::line(working(|_| {
+                write_terrain_model_scene(&target.directory, target.seed)
+            })?);
             Ok(())
         }
         Command::Archive(arguments) => archive(arguments),
@@ -261,18 +264,23 @@ fn mission(arguments: &MissionArguments) -> Result<(), Error> {
         passes: arguments.passes,
         errors: arguments.errors(),
     };
-    output::line(if arguments.images {
-        write_scene_with_images(directory, &options, arguments.coder.coder())?
-    } else {
-        write_scene(directory, &options)?
-    });
+    let coder = arguments.coder.coder();
+    output::line(working(|watch| {
+        if arguments.images {
+            write_scene_with_images(directory, &options, coder, watch)
+        } else {
+            write_scene(directory, &options)
+        }
+    })?);
     Ok(())
 }
 
 fn along(arguments: &AlongArguments) -> Result<(), Error> {
     let Target { directory, seed } = &arguments.target;
     let AlongArguments { kernels, label, .. } = arguments;
-    output::line(write_scene_along(directory, kernels, label, *seed)?);
+    output::line(working(|_| {
+        write_scene_along(directory, kernels, label, *seed)
+    })?);
     Ok(())
 }
 
@@ -284,8 +292,15 @@ fn archive(arguments: &ArchiveArguments) -> Result<(), Error> {
         Some(days) => ArchiveOptions { seed, days },
         None => ArchiveOptions::of_size(seed, size.gb.unwrap_or_default()),
     };
-    output::line(write_archive(&target.directory, &options)?);
+    output::line(working(|watch| {
+        write_archive(&target.directory, &options, watch)
+    })?);
     Ok(())
+}
+
+/// Writes a scene, and shows the progress.
+fn working<T>(write: impl FnOnce(Watch<'_>) -> T) -> T {
+    Progress::of_work("scene").watch("writing", write)
 }
 
 #[cfg(test)]

@@ -53,9 +53,6 @@ pub(super) struct Arguments {
     /// Listen at this address instead of the configured one; port 0 selects a free port.
     #[arg(long, value_name = "ADDRESS:PORT", conflicts_with = "init")]
     listen: Option<SocketAddr>,
-    /// Log as JSON, one object per line.
-    #[arg(long)]
-    pub(super) log_json: bool,
 }
 
 pub(super) fn run(arguments: &Arguments) -> ExitCode {

@@ -33,9 +33,9 @@ pub(super) struct RunFlags {
     /// Read all input files, stored outputs and products again, even if unchanged.
     #[arg(long)]
     pub(super) rehash: bool,
-    /// Show the stages that would run, with the reasons; write no products.
+    /// State how many stages would run, and why (with -v for each stage), as `areograph plan`; write no products.
     #[arg(long)]
-    pub(super) dry_run: bool,
+    pub(super) plan: bool,
     /// Print JSON.
     #[arg(long)]
     pub(super) json: bool,
@@ -71,7 +71,7 @@ fn ran(task: Task<'_>, out: &Path, arguments: &RunArguments) -> Result<Option<Ru
         roots: &[],
         observer,
     };
-    if flags.dry_run {
+    if flags.plan {
         plan::print(&[task], &options(&()), flags.json)?;
         return Ok(None);
     }

@@ -64,6 +64,7 @@ pub fn check_answer(site: &str, checked: &Checked) -> Value {
         "ready": checked.failures.is_empty(),
         "findings": checked.findings,
         "verdict": checked.verdict,
+        "products_are_current": checked.has_products,
         "failures": failures.collect::<Vec<_>>(),
     })
 }

@@ -1,14 +1,15 @@
-//! The flow of a check: configuration, files and kernel coverage of a site, then the verdict of a run, without
-//! writing anything.
+//! The flow of a check: configuration, files and kernel coverage of a site, and on request the verdict of a run; no
+//! product is written.
 
-use std::{collections::BTreeSet, path::PathBuf, sync::atomic::AtomicBool};
+use std::{collections::BTreeSet, path::PathBuf, sync::atomic::AtomicBool, time::Instant};
 
 use super::{
-    RivalSet,
+    Observer, RivalSet, RunOptions, StageEvent, Task,
     driver::{Driver, Exit, Flow, Publication, SiteDriver},
     kernels::{load_rivals, required_coverage},
     outputs::Prepared,
     overlays::overlays,
+    plan::plan_task,
     site::{finish, kernels, orient, prepare},
     triangulate::{match_ties, ties_of_files},
 };
@@ -18,9 +19,10 @@ use crate::{
     files::{HashedFile, InputFiles},
     kernel_source::KernelSource,
     spice::RequiredCoverage,
-    stage::{Output, Provenance, Round, Stage},
+    stage::{Output, Provenance, Reason, Round, Stage},
     stages::{group_profiles::Profile, judge::Verdict, tag_times::ImageTimes},
-    store::hashes::HashCache,
+    store::publish::read_manifest,
+    watch::{Counter, Watch},
 };
 
 /// Outcome of a check.
@@ -30,21 +32,34 @@ pub struct Checked {
     pub findings: Vec<String>,
     /// All failures of a run, not only the first.
     pub failures: Vec<Error>,
-    /// The verdict of a run; `None` if an input prevents it.
+    /// The verdict of a run; `None` if an input prevents it, or if it is not known without computing.
     pub verdict: Option<Verdict>,
+    /// Whether the verdict is that of products that are up to date.
+    pub has_products: bool,
+}
+
+/// Extent of a check.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Extent {
+    /// Inputs and coverage; the verdict of products that are up to date.
+    Inputs,
+    /// Also the verdict of a run: every stage is computed, unless products are up to date.
+    Full,
 }
 
 /// Checks a site's kernels, labels, PEDR and tie point files, and coverage at its images and at its shots; of rival
 /// sets of kernels every one, since any of them may be chosen.
 ///
-/// The PEDR files are searched as in a run: only shots in the windows determine the required times. If all inputs are
-/// valid, all stages run as in a run, and causes that would make its products invalid are failures too.
+/// The PEDR files are searched as in a run: only shots in the windows determine the required times. Causes that would
+/// make products invalid are failures too, as far as `extent` determines them.
 ///
-/// * `hashes` – kernels that are known there are not read again for the check of their content; nothing is added
+/// * `options` – those of the run; kernels that are known to `hashes` are not read again for the check of their content
 #[must_use]
-pub fn check_site(config: &SiteConfig, hashes: &HashCache) -> Checked {
-    let mut check = Check::of(config, hashes.files());
-    if let Err(Exit::Failed(failure) | Exit::NotAdjusted(failure)) = check.all(config) {
+pub fn check_site(config: &SiteConfig, extent: Extent, options: &RunOptions<'_>) -> Checked {
+    let files = options.hashes.files();
+    let mut check = Check::of(config, files, options.stop, options.observer);
+    let checked = check.all(config, extent, options);
+    if let Err(Exit::Failed(failure) | Exit::NotAdjusted(failure)) = checked {
         check.checked.failures.push(failure.in_site(&config.site));
     }
     check.checked
@@ -55,7 +70,8 @@ pub fn check_site(config: &SiteConfig, hashes: &HashCache) -> Checked {
 /// # Errors
 /// Failures of those stages with labels, clocks and PEDR files.
 pub fn required_by_site(config: &SiteConfig) -> Result<RequiredCoverage> {
-    let mut check = Check::of(config, InputFiles::default());
+    let never = AtomicBool::new(false);
+    let mut check = Check::of(config, InputFiles::default(), &never, &());
     let prepared = prepare(&mut check, config);
     if let Some(failure) = check.checked.failures.into_iter().next() {
         return Err(failure);
@@ -79,7 +95,7 @@ pub fn rival_sets(config: &SiteConfig) -> Result<Vec<RivalSet>> {
 
 /// The products of a run would be invalid.
 #[derive(Debug, thiserror::Error, Cause)]
-#[error("products would be invalid: {reason}")]
+#[error("products are invalid: {reason}")]
 #[cause(Validation: "a run still writes the products, marks them as invalid, and reports the numbers")]
 struct WouldBeInvalid {
     reason: String,
@@ -88,7 +104,8 @@ struct WouldBeInvalid {
 struct Check<'a> {
     site: &'a str,
     files: InputFiles,
-    never: AtomicBool,
+    stop: &'a AtomicBool,
+    observer: &'a dyn Observer,
     /// Set of kernels to which findings refer.
     prefix: String,
     /// Whether all inputs are valid, so that every stage runs as it does in a run.
@@ -99,11 +116,17 @@ struct Check<'a> {
 }
 
 impl<'a> Check<'a> {
-    fn of(config: &'a SiteConfig, files: InputFiles) -> Self {
+    fn of(
+        config: &'a SiteConfig,
+        files: InputFiles,
+        stop: &'a AtomicBool,
+        observer: &'a dyn Observer,
+    ) -> Self {
         Self {
             site: &config.site,
             files,
-            never: AtomicBool::new(false),
+            stop,
+            observer,
             prefix: String::new(),
             is_trial: false,
             checked: Checked::default(),
@@ -111,7 +134,7 @@ impl<'a> Check<'a> {
         }
     }
 
-    fn all(&mut self, config: &SiteConfig) -> Flow<()> {
+    fn all(&mut self, config: &SiteConfig, extent: Extent, options: &RunOptions<'_>) -> Flow<()> {
         let prepared = prepare(self, config)?;
         if !config.ties.files.is_empty() {
             let times = self.usable(&prepared.images);
@@ -126,11 +149,38 @@ impl<'a> Check<'a> {
         } else {
             self.check_kernels(config, prepared.clone(), 0)?;
         }
-        if self.checked.failures.is_empty() {
+        if self.checked.failures.is_empty()
+            && !self.reuse(config, options)?
+            && extent == Extent::Full
+        {
             self.is_trial = true;
             finish(self, config, prepared)?;
         }
         Ok(())
+    }
+
+    /// Takes the verdict of products, if a run would keep them.
+    fn reuse(&mut self, config: &SiteConfig, options: &RunOptions<'_>) -> Flow<bool> {
+        let task = Task::Site(config);
+        let Some(manifest) = read_manifest(&task.folder(&options.out)) else {
+            return Ok(false);
+        };
+        let plan = plan_task(task, options)?;
+        self.checked.has_products = plan.stages.iter().all(|stage| !stage.reason.runs());
+        if self.checked.has_products {
+            self.judge(manifest.verdict);
+        }
+        Ok(self.checked.has_products)
+    }
+
+    /// Enters the verdict; its reasons are failures.
+    fn judge(&mut self, verdict: Verdict) {
+        for reason in &verdict.reasons {
+            let reason = reason.clone();
+            let failure = Error::from(WouldBeInvalid { reason });
+            self.checked.failures.push(failure.in_site(self.site));
+        }
+        self.checked.verdict = Some(verdict);
     }
 
     /// Orbit and orientation with one set of kernels.
@@ -148,6 +198,19 @@ impl<'a> Check<'a> {
             match_ties(self, config, Round::Initial, &images, site.shots()?, None)?;
         }
         overlays(self, config, &mut site)
+    }
+
+    /// Runs a stage, which the observer follows.
+    fn watched<S: Stage>(&self, label: &str, stage: &S) -> Result<S::Output> {
+        self.observer
+            .hear(label, &StageEvent::Begins(&Reason::First));
+        let tell = |count| self.observer.hear(label, &StageEvent::Counts(count));
+        let counter = Counter::new(&tell);
+        let begun = Instant::now();
+        let made = stage.run_watched(Watch::counted(self.stop, &counter));
+        self.observer
+            .hear(label, &StageEvent::Done(begun.elapsed().as_secs_f64()));
+        made
     }
 
     fn tell(&mut self, finding: &str) {
@@ -176,7 +239,7 @@ impl Driver for Check<'_> {
     }
 
     fn stop(&self) -> &AtomicBool {
-        &self.never
+        self.stop
     }
 
     fn enter(&mut self, _stage: &'static str) -> Flow<()> {
@@ -185,7 +248,7 @@ impl Driver for Check<'_> {
 
     /// An unreadable file is reported by the stage that reads it, or by the examination of that stage.
     fn hash(&mut self, _stage: &'static str, paths: &[PathBuf]) -> Flow<Vec<HashedFile>> {
-        let hashed = self.files.hash_all(paths, &self.never);
+        let hashed = self.files.hash_all(paths, self.stop);
         Ok(hashed.unwrap_or_default())
     }
 
@@ -201,7 +264,7 @@ impl Driver for Check<'_> {
     fn stage<S: Stage>(&mut self, stage: &S) -> Flow<Output<S::Output>> {
         let label = stage.label();
         if self.is_trial {
-            let made = stage.run(&self.never).in_stage(&label)?;
+            let made = self.watched(&label, stage).in_stage(&label)?;
             return Ok(known(label, made));
         }
         let mut sound = true;
@@ -215,7 +278,7 @@ impl Driver for Check<'_> {
         if !(sound && S::CHECKED && stage.inputs().is_complete()) {
             return Ok(pending);
         }
-        let made = stage.run(&self.never);
+        let made = self.watched(&label, stage);
         let Some(value) = self.note(&label, made) else {
             return Ok(pending);
         };
@@ -227,13 +290,7 @@ impl Driver for Check<'_> {
 
     /// The verdict, as a run would publish it.
     fn publish(&mut self, publication: &impl Publication) -> Flow<()> {
-        let verdict = publication.verdict()?;
-        for reason in &verdict.reasons {
-            let reason = reason.clone();
-            let failure = Error::from(WouldBeInvalid { reason });
-            self.checked.failures.push(failure.in_site(self.site));
-        }
-        self.checked.verdict = Some(verdict);
+        self.judge(publication.verdict()?);
         Ok(())
     }
 }

@@ -58,7 +58,7 @@ fn a_plan_of_a_net_and_of_a_calibration_says_what_a_run_does() {
     // One key of each.
     let text = String::from_utf8(case.read(LINES)).unwrap();
     case.write(LINES, text + "\n[a_priori]\nlook_px = 40.0\n");
-    let dry = plan(&case, &["calibrate", LINES, "--dry-run"]);
+    let dry = plan(&case, &["calibrate", LINES, "--plan"]);
     assert_eq!(dry[1], "run calibrate key a_priori.look_px changed");
     assert!(dry[2].starts_with("run publish"), "{dry:#?}");
     // The command runs what its plan names, and the other one stands.
@@ -77,7 +77,7 @@ fn a_flow_stops_after_the_stage_that_is_named() {
         "exit 0\nsynthetic_net: stopped after triangulate, no products\n"
     );
     assert!(!case.path("out/synthetic_net/manifest.json").exists());
-    let rest = plan(&case, &["triangulate", NET, "--dry-run"]);
+    let rest = plan(&case, &["triangulate", NET, "--plan"]);
     assert_eq!(rest[1], "keep triangulate nothing changed");
     assert_eq!(rest[2], "run publish no earlier output");
     let unknown = told(&case, &["calibrate", LINES, "--until", "map_surface"]);

@@ -34,6 +34,7 @@ use areograph::{
     spice::{KernelSet, Session, SpkSegment, State, write_spk},
     stages::check_archive::{ArchiveProfile, ArchiveRules, ArchiveSource, FileCheck, shots_of},
     time::Et,
+    watch::Watch,
 };
 use common::{
     assert_keeps_schema,
@@ -48,7 +49,12 @@ use tempfile::TempDir;
 static ARCHIVE: LazyLock<TempDir> = LazyLock::new(|| {
     let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
     let options = ArchiveOptions { seed: 1, days: 3 };
-    write_archive(&folder.path().join("archive"), &options).unwrap();
+    write_archive(
+        &folder.path().join("archive"),
+        &options,
+        Watch::from(&AtomicBool::new(false)),
+    )
+    .unwrap();
     folder
 });
 
@@ -391,7 +397,7 @@ fn a_killed_check_goes_on_and_ends_the_same() {
     assert!((1..3).contains(&kept), "{kept}");
     let planned = |word: &str| {
         let mut command = qa(&pedr(), &kernels(), out.path());
-        let (code, plan, _) = ended(command.arg("--dry-run"));
+        let (code, plan, _) = ended(command.arg("--plan"));
         assert_eq!(code, 0);
         let file = format!("{word}  check_archive/");
         plan.lines().filter(|line| line.contains(&file)).count()
@@ -478,7 +484,12 @@ fn what_kernels_do_not_cover_is_told() {
     let folder = tempfile::tempdir().unwrap();
     // The same archive, but for its last two days, has the same kernels for the first.
     let first = folder.path().join("first");
-    write_archive(&first, &ArchiveOptions { seed: 1, days: 1 }).unwrap();
+    write_archive(
+        &first,
+        &ArchiveOptions { seed: 1, days: 1 },
+        Watch::from(&AtomicBool::new(false)),
+    )
+    .unwrap();
     let out = folder.path().join("out");
     let told = "23 of 36 profiles could not be checked, and 1 only in part";
     let mut command = qa(&pedr(), &first.join("kernels/archive.tm"), &out);
@@ -777,7 +788,12 @@ fn a_file_that_does_not_open_does_not_hide_the_others() {
 fn kernels_of_another_time_do_not_pass() {
     let folder = tempfile::tempdir().unwrap();
     let first = folder.path().join("first");
-    write_archive(&first, &ArchiveOptions { seed: 1, days: 1 }).unwrap();
+    write_archive(
+        &first,
+        &ArchiveOptions { seed: 1, days: 1 },
+        Watch::from(&AtomicBool::new(false)),
+    )
+    .unwrap();
     let last = folder.path().join("pedr");
     fs::create_dir(&last).unwrap();
     symlink(pedr().join("ap10025l.b"), last.join("ap10025l.b")).unwrap();

@@ -295,7 +295,7 @@ fn pedr_files_of_one_name_are_of_distinct_images() {
 }
 
 #[test]
-fn until_force_and_dry_run() {
+fn until_force_and_plan() {
     let case = Case::new();
     let mut command = case.run();
     command.args(["--until", "convert_datum"]);
@@ -305,7 +305,7 @@ fn until_force_and_dry_run() {
     );
     assert!(!case.path("out/case/manifest.json").exists());
     let mut command = case.run();
-    command.arg("--dry-run");
+    command.arg("--plan");
     let printed = case.outcome(command);
     assert!(printed.contains("keep  convert_datum"), "{printed}");
     assert!(

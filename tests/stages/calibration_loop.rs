@@ -30,6 +30,7 @@ use areograph::{
     scene::{write_calibration_loop_scene, write_terrain_model_scene},
     stages::line_camera::LineCamera,
     store::publish::CACHE,
+    watch::Watch,
 };
 use common::{
     assert_keeps_schema,
@@ -57,7 +58,12 @@ static RUN: LazyLock<RunOutcome> = LazyLock::new(|| {
 
 fn scene(seed: u64) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    write_calibration_loop_scene(&folder.path().join("lines"), seed).unwrap();
+    write_calibration_loop_scene(
+        &folder.path().join("lines"),
+        seed,
+        Watch::from(&AtomicBool::new(false)),
+    )
+    .unwrap();
     folder
 }
 

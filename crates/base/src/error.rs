@@ -251,9 +251,18 @@ impl IoError {
     }
 }
 
+/// First words of the actions of [`IoError`] that need an existing file or folder.
+const READING: [&str; 5] = ["read", "open", "list", "look", "find"];
+
 impl Cause for IoError {
     fn kind(&self) -> Kind {
-        Kind::Io
+        let is_read = READING.iter().any(|verb| self.action.starts_with(verb));
+        if is_read && self.source.kind() == std::io::ErrorKind::NotFound {
+            // Like a wrong file: only new input helps.
+            Kind::Input
+        } else {
+            Kind::Io
+        }
     }
 
     fn advice(&self) -> String {

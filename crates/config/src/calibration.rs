@@ -183,7 +183,7 @@ declare_table! {
         /// Paths or globs of tables (.csv), one row per measurement: `point`, `camera`, `line`, `sample` (0 at the
         /// outer edge of the first line and sample) and, where known, `sigma_line`, `sigma_sample`.
         #[serde(skip)]
-        files: Vec<PathBuf> = key(Globs).or(Vec::new()).example(r#"["ties.csv"]"#),
+        files: Vec<PathBuf> = key(Globs(&["csv"])).or(Vec::new()).example(r#"["ties.csv"]"#),
         /// Whether areograph measures tie points itself, in the `pixels` of all cameras. Rounds of tie points, terrain
         /// model, laser control and calibration then follow until convergence, each with the cameras of the preceding
         /// round (Li et al. 2023).
@@ -219,7 +219,7 @@ declare_table! {
     pub struct CalibrationLaserConfig {
         /// Paths or globs of PEDR files.
         #[serde(skip)]
-        files: Vec<PathBuf> = key(Globs).or(Vec::new()).unused(r#"["pedr/*.b"]"#),
+        files: Vec<PathBuf> = key(Globs(&["b"])).or(Vec::new()).unused(r#"["pedr/*.b"]"#),
         /// Edge of a cell of the terrain model, metres; at least one pixel.
         cell_m: Option<f64> = key(above_to(0.0, 1e5)).unused("100.0"),
         /// Search radius for the shift of a unit of shots, cells: the largest possible error of orbit and mounting.
@@ -265,7 +265,7 @@ declare_table! {
         /// and the contributions of matching to the latter two, `sigma_matching_horizontal_m` and
         /// `sigma_matching_vertical_m`.
         #[serde(skip)]
-        files: Vec<PathBuf> = key(Globs).or(Vec::new()).example(r#"["control.csv"]"#),
+        files: Vec<PathBuf> = key(Globs(&["csv"])).or(Vec::new()).example(r#"["control.csv"]"#),
         /// Standard deviation of measured lines and samples, if missing from the table.
         sigma_px: f64 = key(from_to(SIGMA_MIN, 100.0)).or(1.0),
         /// Standard deviation of a horizontal coordinate of a laser point, if missing from the table; the default
@@ -330,13 +330,13 @@ declare_table! {
         id: String = key(identifier()).required().example(r#""i818""#),
         /// Paths or globs of the image support data of this orbit, one file per camera, identified by `name_sensor`.
         #[serde(skip)]
-        isd: Vec<PathBuf> = key(Globs).required_as("paths or globs of image support data").example(r#"["isd/i818_*.json"]"#),
+        isd: Vec<PathBuf> = key(Globs(&["json"])).required_as("paths or globs of image support data").example(r#"["isd/i818_*.json"]"#),
         /// Tables of the tie points of this orbit.
         #[serde(skip)]
-        ties: Vec<PathBuf> = key(Globs).required_as("paths or globs of tables of tie points").example(r#"["i818_ties.csv"]"#),
+        ties: Vec<PathBuf> = key(Globs(&["csv"])).required_as("paths or globs of tables of tie points").example(r#"["i818_ties.csv"]"#),
         /// Tables of the laser points of this orbit.
         #[serde(skip)]
-        control: Vec<PathBuf> = key(Globs).required_as("paths or globs of tables of laser points")
+        control: Vec<PathBuf> = key(Globs(&["csv"])).required_as("paths or globs of tables of laser points")
             .example(r#"["i818_control.csv"]"#),
     }
 }

@@ -232,23 +232,31 @@ pub(super) fn matching(expected: &str, pattern: &'static str, takes: fn(&str) ->
 /// An identifier in lower-case letters: it names folders, so paths are no identifiers.
 pub(super) fn lower_case_identifier() -> Matching {
     Matching {
-        expected: expected_identifier("lower-case letters"),
+        expected: SITE_IDENTIFIER.to_owned(),
         pattern: "^[a-z0-9][a-z0-9_-]{0,63}$",
-        takes: |text| is_identifier(text) && !text.contains(|c: char| c.is_ascii_uppercase()),
+        takes: is_site_identifier,
     }
 }
 
 /// An identifier in letters of both cases.
 pub(super) fn identifier() -> Matching {
     Matching {
-        expected: expected_identifier("letters"),
+        expected: format!(
+            "1 to {IDENTIFIER_MAX} letters, digits, `_` or `-`, beginning with a letter or digit"
+        ),
         pattern: "^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$",
         takes: is_identifier,
     }
 }
 
-fn expected_identifier(letters: &str) -> String {
-    format!("1 to {IDENTIFIER_MAX} {letters}, digits, `_` or `-`, beginning with a letter or digit")
+/// The form of the identifier of a site.
+pub const SITE_IDENTIFIER: &str =
+    "1 to 64 lower-case letters, digits, `_` or `-`, beginning with a letter or digit";
+
+/// Whether a text may be the identifier of a site.
+#[must_use]
+pub fn is_site_identifier(text: &str) -> bool {
+    is_identifier(text) && !text.contains(|c: char| c.is_ascii_uppercase())
 }
 
 fn is_identifier(text: &str) -> bool {

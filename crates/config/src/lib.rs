@@ -63,6 +63,7 @@ pub use calibration::{
 pub use declare::{Accept, DeclaredKey, ValueKind, Word};
 pub use document::{Document, Loaded};
 pub use exposures::{ExposurePiece, line_times_of};
+pub use forms::{SITE_IDENTIFIER, is_site_identifier};
 pub use images::ImageConfig;
 pub use instruments::{
     all_instruments, altimeter, built_in_altimeters, built_in_instruments, instrument,
@@ -89,8 +90,10 @@ pub use site::SiteConfig;
 pub use surface::SurfaceConfig;
 pub use ties::{IntersectionConfig, TiesConfig};
 pub use unknowns::{PositionUnknowns, RotationUnknowns};
-pub use window_list::{load_windows, require_outlines, window_of_box, window_of_polygon};
-pub use windows::WindowConfig;
+pub use window_list::{
+    load_windows, require_outlines, suspicious_width_deg, window_of_box, window_of_polygon,
+};
+pub use windows::{BoxCoordinates, LatitudeKind, LongitudeSense, WindowConfig};
 
 use areograph_base::error::{Cause, Error};
 use declare::described;

@@ -90,7 +90,7 @@ declare_table! {
         /// as on a map, unless `y_axis` is "down". A crater enclosed by two settings of a cross has `x_upper_right`,
         /// `y_upper_right`, `x_lower_left`, `y_lower_left` instead of `x`, `y`. Each picture may have its own units.
         #[serde(skip)]
-        files: Vec<PathBuf> = key(Globs)
+        files: Vec<PathBuf> = key(Globs(&["csv"]))
             .required_as("paths or globs of tables of measurements")
             .example(r#"["measurements.csv"]"#),
         /// Direction of y in all pictures.
@@ -118,7 +118,7 @@ declare_table! {
         /// `y_km`) or with `longitude_deg` (east) and `latitude_deg` (areocentric); `sigma_m` or `sigma_km` for a
         /// control with an individual standard deviation.
         #[serde(skip)]
-        files: Vec<PathBuf> = key(Globs)
+        files: Vec<PathBuf> = key(Globs(&["csv"]))
             .required_as("paths or globs of tables of controls")
             .example(r#"["controls.csv"]"#),
         /// Standard deviation of a control coordinate, including its measurement, if missing from the table. Without
@@ -137,7 +137,7 @@ declare_table! {
         /// brick) and `metres_per_unit` (size of a coordinate unit on the ground). The size tests the scale of the
         /// controls: if the adjusted size differs by more than 2 %, the net is invalid.
         #[serde(skip)]
-        files: Vec<PathBuf> = key(Globs).or(Vec::new()).unused(r#"["pictures.csv"]"#),
+        files: Vec<PathBuf> = key(Globs(&["csv"])).or(Vec::new()).unused(r#"["pictures.csv"]"#),
     }
 }
 
@@ -149,7 +149,7 @@ declare_table! {
         /// double interpolation (drum scanners). With `upper`, `lower`, `left` and `right`, the middles of the edges, a
         /// quadratic term that is 0 at the corners is added (cathode-ray recorders).
         #[serde(skip)]
-        files: Vec<PathBuf> = key(Globs).or(Vec::new()).unused(r#"["ticks.csv"]"#),
+        files: Vec<PathBuf> = key(Globs(&["csv"])).or(Vec::new()).unused(r#"["ticks.csv"]"#),
     }
 }
 

@@ -63,8 +63,13 @@ impl Form for Place {
             if review.may_lack(&path) {
                 return Some(path);
             }
-            let (kind, shown) = (&self.kind, path.display());
-            found.refuse(review, format!("{kind}; {shown} is {}", what_is_at(&path)));
+            let (span, there) = (found.value.span(), what_is_at(&path));
+            let expected = format!("{}; {} is {there}", self.kind, path.display());
+            if there == MISSING {
+                review.refuse_absent(span, &found.key, expected);
+            } else {
+                review.refuse(span, &found.key, expected);
+            }
         } else if !review.admit(&path, found.value.span(), &found.key) {
             return None;
         }
@@ -77,6 +82,9 @@ impl Form for Place {
     }
 }
 
+/// The kind of an entry that does not exist.
+const MISSING: &str = "missing";
+
 /// Kind of the entry at a path, for messages.
 fn what_is_at(path: &Path) -> &'static str {
     match path.metadata() {
@@ -84,12 +92,13 @@ fn what_is_at(path: &Path) -> &'static str {
         Ok(found) if found.is_file() => "a file",
         Ok(_) => "neither a file nor a folder",
         Err(error) if error.kind() == std::io::ErrorKind::PermissionDenied => "not readable",
-        Err(_) => "missing",
+        Err(_) => MISSING,
     }
 }
 
-/// All files that the globs match, sorted by path; a file reached twice is taken once.
-pub(super) struct Globs;
+/// All files that the globs match, and files with these endings in and below folders, sorted by path; a file reached twice
+/// is taken once.
+pub(super) struct Globs(pub(super) &'static [&'static str]);
 
 impl Form for Globs {
     type Value = Vec<PathBuf>;
@@ -113,12 +122,15 @@ impl Form for Globs {
         let mut by_identity: BTreeMap<PathBuf, PathBuf> = BTreeMap::new();
         for written in globs {
             let matched = match written.get_ref().as_str() {
-                Some(glob) => matches(&review.resolve(""), glob),
+                Some(glob) => matches(&review.resolve(""), glob, self.0),
                 None => Err(Unmatched::Other(ValueKind::Glob.to_string())),
             };
             match matched {
                 Err(Unmatched::Absent(pattern)) if review.may_lack(&pattern) => {
                     by_identity.insert(pattern.clone(), pattern);
+                }
+                Err(absent @ Unmatched::Absent(_)) => {
+                    review.refuse_absent(written.span(), &found.key, absent);
                 }
                 Err(expected) => review.refuse(written.span(), &found.key, expected),
                 Ok(paths) => {
@@ -182,7 +194,7 @@ impl fmt::Display for Unmatched {
                 let pattern = pattern.display();
                 write!(
                     formatter,
-                    "a glob that matches a file; {pattern} matches none"
+                    "a file, a folder or a glob; {pattern} matches no file"
                 )
             }
             Self::Other(expected) => formatter.write_str(expected),
@@ -200,7 +212,9 @@ pub(super) fn below(folder: &Path, glob: &str) -> String {
 }
 
 /// Files that one glob matches below `folder`, or what was expected of it.
-fn matches(folder: &Path, glob: &str) -> Result<Vec<PathBuf>, Unmatched> {
+///
+/// * `endings` – of the files that a folder stands for
+fn matches(folder: &Path, glob: &str, endings: &[&str]) -> Result<Vec<PathBuf>, Unmatched> {
     // `**` and long rows of wildcards could walk an entire disk.
     let wild_parts = glob
         .split('/')
@@ -215,7 +229,14 @@ fn matches(folder: &Path, glob: &str) -> Result<Vec<PathBuf>, Unmatched> {
         |error: glob::PatternError| format!("a glob: {} at character {}", error.msg, error.pos + 1);
     // Checked separately first, so that the position refers to the written text.
     glob::Pattern::new(glob).map_err(invalid)?;
-    let pattern = below(folder, glob);
+    let written = below(folder, glob);
+    let is_folder = folder.join(glob).is_dir();
+    let pattern = if is_folder {
+        let folder = folder.join(glob);
+        below(&folder, "**/*")
+    } else {
+        written.clone()
+    };
     let found = glob::glob(&pattern).map_err(invalid)?;
     let mut files = Vec::new();
     for entry in found.take(FILES_MAX + 1) {
@@ -226,6 +247,9 @@ fn matches(folder: &Path, glob: &str) -> Result<Vec<PathBuf>, Unmatched> {
                 error.error()
             )
         })?;
+        if is_folder && !has_ending(&path, endings) {
+            continue;
+        }
         match path.metadata() {
             Ok(found) if found.is_file() => files.push(path),
             Ok(_) => {}
@@ -239,7 +263,18 @@ fn matches(folder: &Path, glob: &str) -> Result<Vec<PathBuf>, Unmatched> {
         }
     }
     if files.is_empty() {
-        return Err(Unmatched::Absent(pattern.into()));
+        return Err(if is_folder {
+            let expected = format!("a folder of files *.{}", endings.join(", *."));
+            Unmatched::Other(expected)
+        } else {
+            Unmatched::Absent(written.into())
+        });
     }
     Ok(files)
+}
+
+/// Whether the name of a file ends so, in upper or lower case.
+fn has_ending(path: &Path, endings: &[&str]) -> bool {
+    let ending = path.extension().unwrap_or_default();
+    endings.iter().any(|one| ending.eq_ignore_ascii_case(one))
 }

@@ -23,7 +23,7 @@ declare_table! {
         /// accepted, and letter case is significant. A glob that matches no file is refused. Every shot is counted
         /// once: a copy of a file is read once, and two versions of one orbit are refused.
         #[serde(skip)]
-        files: Vec<PathBuf> = key(Globs)
+        files: Vec<PathBuf> = key(Globs(&["b"]))
             .required_as("paths or globs of PEDR files (or no table [pedr] at all)")
             .example(r#"["../pedr/*.b"]"#),
         /// Datum of the coordinates in the files; a stated datum must not contradict the version letter or the label.

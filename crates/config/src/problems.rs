@@ -7,7 +7,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use areograph_base::error::Cause;
+use areograph_base::error::{Cause, Kind};
 use areograph_store::files::outside;
 
 /// Problems reported one by one; for a file with more, the number of the others is reported.
@@ -20,12 +20,34 @@ pub(super) const SITE_EXAMPLE: &str = "config/sites/example.toml";
 
 /// Everything that is wrong with one configuration file, in order of place.
 #[derive(Debug, Clone, PartialEq, Eq, Cause)]
-#[cause(Configuration: "correct these entries; {documentation} documents every key with its unit and default")]
+#[cause(kind_of(*is_absence): "{}", advice_on(*is_absence, documentation))]
 pub struct Problems {
     lines: Vec<String>,
+    /// Whether every problem is a file that does not exist.
+    is_absence: bool,
     unlisted: usize,
     /// The file that documents every key.
     documentation: &'static str,
+}
+
+/// A missing file has the same kind wherever it is named.
+const fn kind_of(is_absence: bool) -> Kind {
+    if is_absence {
+        Kind::Input
+    } else {
+        Kind::Configuration
+    }
+}
+
+fn advice_on(is_absence: bool, documentation: &str) -> String {
+    if is_absence {
+        "correct these paths, which count from the folder of the file, or provide the files"
+            .to_owned()
+    } else {
+        format!(
+            "correct these entries; {documentation} documents every key with its unit and default"
+        )
+    }
 }
 
 impl Problems {
@@ -33,6 +55,7 @@ impl Problems {
     pub(super) fn of_file(file: &Path, text: &str) -> Self {
         Self {
             lines: vec![format!("{}: {text}", file.display())],
+            is_absence: false,
             unlisted: 0,
             documentation: SITE_EXAMPLE,
         }
@@ -71,6 +94,8 @@ pub(super) struct Review<'a> {
     file: &'a Path,
     text: &'a str,
     problems: Vec<(TextSpan, String)>,
+    /// Number of problems that are files that do not exist.
+    absences: usize,
     unlisted: usize,
     warnings: Vec<(TextSpan, String)>,
     renames: BTreeSet<Rename>,
@@ -89,6 +114,7 @@ impl<'a> Review<'a> {
             file,
             text,
             problems: Vec::new(),
+            absences: 0,
             unlisted: 0,
             warnings: Vec::new(),
             renames: BTreeSet::new(),
@@ -176,6 +202,17 @@ impl<'a> Review<'a> {
         self.problem(Some(span), format!("{key} is {value}; expected {expected}"));
     }
 
+    /// The value at `span` names a file that does not exist.
+    pub(super) fn refuse_absent(
+        &mut self,
+        span: Range<usize>,
+        key: &str,
+        expected: impl fmt::Display,
+    ) {
+        self.absences += 1;
+        self.refuse(span, key, expected);
+    }
+
     /// `key` is absent from the table at `place`.
     pub(super) fn missing(&mut self, place: TextSpan, key: &str, expected: impl fmt::Display) {
         self.problem(place, format!("{key} is missing; expected {expected}"));
@@ -215,6 +252,7 @@ impl<'a> Review<'a> {
         match value {
             Some(value) if problems.is_empty() => Ok((value, self.placed(warnings))),
             _ => Err(Problems {
+                is_absence: self.absences == problems.len() + self.unlisted,
                 lines: self.placed(problems),
                 unlisted: self.unlisted,
                 documentation: self.documentation,

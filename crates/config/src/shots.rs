@@ -35,7 +35,7 @@ declare_table! {
     pub struct ShotTableConfig: Deserialize {
         /// Paths or globs of tables, as in `[pedr]`.
         #[serde(skip)]
-        files: Vec<PathBuf> = key(Globs)
+        files: Vec<PathBuf> = key(Globs(&["csv", "tab"]))
             .required_as("paths or globs of tables of shots")
             .unused(r#"["../lola/*.csv"]"#),
         /// Known layout of columns, in place of a table `columns`.

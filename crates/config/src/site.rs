@@ -315,6 +315,15 @@ fn other_bodies(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
                 .refuse(layout.span(), "shots.layout", expected);
         }
     }
+    for table in keys.entries(&["windows"]) {
+        let kind = table.get("latitude");
+        if let Some(kind) = kind.filter(|word| word.get_ref().as_str() == Some("areographic")) {
+            let expected =
+                format!("areocentric: areographic latitudes are those of Mars, not of {body}");
+            keys.review()
+                .refuse(kind.span(), "windows.latitude", expected);
+        }
+    }
     let only_at_mars = format!("no such entry on {body}: it belongs to Mars Global Surveyor");
     for table in ["pedr", "altimeter_clock", "pointing"] {
         keys.refuse(table, &only_at_mars);

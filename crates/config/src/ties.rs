@@ -26,7 +26,7 @@ declare_table! {
         /// `serial_number` is the `serial_number`, the `id` or the serial number in ISIS of an image; measurements in
         /// other images are counted and excluded.
         #[serde(skip)]
-        files: Vec<PathBuf> = key(Globs)
+        files: Vec<PathBuf> = key(Globs(&["csv", "net", "pvl"]))
             .or(Vec::new())
             .example(r#"["../ties/*.csv"]"#),
         /// Whether areograph measures tie points itself, in addition to tie points in files. Every pair of images with

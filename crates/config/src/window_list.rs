@@ -98,9 +98,9 @@ pub fn window_of_box(id: &str, edges_deg: [f64; 4]) -> Result<WindowConfig, Erro
     let refuse = |what: String, expected| Err(WindowError::Box { what, expected }.into());
     if ![west, east]
         .iter()
-        .all(|edge| (-180.0..=360.0).contains(edge))
+        .all(|edge| (-360.0..=360.0).contains(edge))
     {
-        return refuse(format!("longitudes {west} and {east}"), "-180 to 360");
+        return refuse(format!("longitudes {west} and {east}"), "-360 to 360");
     }
     if !(-90.0 <= south && south < north && north <= 90.0) {
         let expected = "-90 to 90, south below north";
@@ -121,6 +121,14 @@ pub fn window_of_box(id: &str, edges_deg: [f64; 4]) -> Result<WindowConfig, Erro
             north_rad,
         },
     })
+}
+
+/// The width of a box that covers more than half of all longitudes, but not all: its edges may have been exchanged.
+/// Degrees.
+#[must_use]
+pub fn suspicious_width_deg([west_deg, east_deg]: [f64; 2]) -> Option<f64> {
+    let width_deg = (east_deg - west_deg).rem_euclid(360.0);
+    (width_deg > 180.0).then_some(width_deg)
 }
 
 /// The window of the polygons in a GeoJSON file; its identifier is the file's name.
@@ -153,8 +161,8 @@ mod tests {
         assert_eq!(load_windows(&path).unwrap(), [window]);
         for (edges, expected) in [
             (
-                [-181.0, 0.0, 0.0, 1.0],
-                "longitudes -181 and 0; expected -180 to 360",
+                [-361.0, 0.0, 0.0, 1.0],
+                "longitudes -361 and 0; expected -360 to 360",
             ),
             (
                 [0.0, 1.0, 2.0, 1.0],

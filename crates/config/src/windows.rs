@@ -5,14 +5,21 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use areograph_base::units::{METRES_PER_KM, RADIANS_PER_DEGREE};
-use areograph_geom::window::WindowShape;
+use areograph_base::{
+    body::Body,
+    units::{METRES_PER_KM, RADIANS_PER_DEGREE},
+};
+use areograph_geom::{
+    ellipsoid::{AreocentricLatitude, AreographicLatitude},
+    window::WindowShape,
+};
 
 use super::{
     declare::{Declare as _, Keys, Many, declare_table, group, key},
-    forms::{from_to, identifier, several},
+    forms::{from_to, identifier, several, words},
     geojson,
     paths::FILE,
+    window_list::suspicious_width_deg,
 };
 
 /// Bits of the column `Footprints::windows`.
@@ -59,10 +66,21 @@ declare_table! {
         /// wide. `[0, 360]` or `[-180, 180]` means all longitudes; a window that also reaches 90 or -90 degrees of
         /// latitude contains the pole.
         longitude_deg: Option<[f64; 2]> =
-            key(several(from_to(-180.0, 360.0), "two numbers [west, east]")).example("[318.0, 318.7]"),
-        /// South and north edges, areocentric.
+            key(several(from_to(-360.0, 360.0), "two numbers [west, east]")).example("[318.0, 318.7]"),
+        /// South and north edges.
         latitude_deg: Option<[f64; 2]> =
             key(several(from_to(-90.0, 90.0), "two numbers [south, north]")).example("[-14.0, -12.9]"),
+        /// Direction in which these longitudes increase.
+        longitude: LongitudeSense = key(words([
+            ("east", LongitudeSense::East, ""),
+            ("west", LongitudeSense::West, "as on older maps of Mars"),
+        ])).or(LongitudeSense::East),
+        /// Kind of these latitudes. Areographic ones are converted with the ellipsoid of IAU 2000; polygons and products
+        /// are always areocentric.
+        latitude: LatitudeKind = key(words([
+            ("areocentric", LatitudeKind::Areocentric, ""),
+            ("areographic", LatitudeKind::Areographic, "only on Mars"),
+        ])).or(LatitudeKind::Areocentric),
         /// GeoJSON file.
         polygon: Option<PathBuf> = key(FILE).example_in(1, r#""outline.geojson""#),
         /// Identifier of an image of the site. The window is the outline of this image, computed from image times and
@@ -112,7 +130,24 @@ fn shape(written: ShapeKeys, keys: &mut Keys<'_, '_>) -> WindowShape {
         };
     }
     keys.unused("margin_km", "only the outline of an image has a margin");
-    let bounds = bounds(written.longitude_deg, written.latitude_deg, keys);
+    if written.polygon.is_some() {
+        for key in ["longitude", "latitude"] {
+            keys.unused(
+                key,
+                "polygons have east longitudes and areocentric latitudes",
+            );
+        }
+    }
+    let coordinates = BoxCoordinates {
+        longitude: written.longitude,
+        latitude: written.latitude,
+    };
+    let bounds = bounds(
+        written.longitude_deg,
+        written.latitude_deg,
+        coordinates,
+        keys,
+    );
     let outline = written.polygon.and_then(|path| outline(&path, keys));
     bounds.or(outline).unwrap_or_else(nowhere)
 }
@@ -141,9 +176,11 @@ fn outline(path: &Path, keys: &mut Keys<'_, '_>) -> Option<WindowShape> {
 fn bounds(
     longitude: Option<[f64; 2]>,
     latitude: Option<[f64; 2]>,
+    coordinates: BoxCoordinates,
     keys: &mut Keys<'_, '_>,
 ) -> Option<WindowShape> {
     let longitudes = longitude.and_then(|pair| {
+        let pair = coordinates.east_deg(pair);
         let wrapped = wrapped_longitudes(pair);
         if wrapped.is_none() {
             keys.refuse(
@@ -163,7 +200,7 @@ fn bounds(
         }
         ordered
     });
-    let ([west, east], [south, north]) = (longitudes?, latitudes?);
+    let ([west, east], [south, north]) = (longitudes?, coordinates.areocentric_deg(latitudes?));
     Some(WindowShape::Box {
         west_rad: west * RADIANS_PER_DEGREE,
         east_rad: east * RADIANS_PER_DEGREE,
@@ -172,10 +209,63 @@ fn bounds(
     })
 }
 
+/// Direction in which longitudes increase.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub enum LongitudeSense {
+    /// Towards east, as in all products.
+    #[default]
+    East,
+    /// Towards west.
+    West,
+}
+
+/// Kind of a latitude.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub enum LatitudeKind {
+    /// Angle of the direction from the centre of Mars with the equator, as in all products.
+    #[default]
+    Areocentric,
+    /// Angle of the normal of the ellipsoid with the equator.
+    Areographic,
+}
+
+/// Coordinates of the edges of a box as a user writes them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct BoxCoordinates {
+    /// Direction of the longitudes.
+    pub longitude: LongitudeSense,
+    /// Kind of the latitudes.
+    pub latitude: LatitudeKind,
+}
+
+impl BoxCoordinates {
+    /// East longitudes of the west and east edge, degrees.
+    #[must_use]
+    pub fn east_deg(self, edges_deg: [f64; 2]) -> [f64; 2] {
+        match self.longitude {
+            LongitudeSense::East => edges_deg,
+            // Not −0.
+            LongitudeSense::West => edges_deg.map(|west| 0.0 - west),
+        }
+    }
+
+    /// Areocentric latitudes of the south and north edge, degrees.
+    #[must_use]
+    pub fn areocentric_deg(self, edges_deg: [f64; 2]) -> [f64; 2] {
+        match self.latitude {
+            LatitudeKind::Areocentric => edges_deg,
+            LatitudeKind::Areographic => edges_deg.map(|latitude_deg| {
+                let latitude = AreographicLatitude(latitude_deg * RADIANS_PER_DEGREE);
+                let AreocentricLatitude(latitude_rad) = latitude.to_areocentric(Body::Mars.model());
+                latitude_rad / RADIANS_PER_DEGREE
+            }),
+        }
+    }
+}
+
 /// Warns of a window that covers more than half of all longitudes, but not all: its edges may have been swapped.
 fn name_wide([west, east]: [f64; 2], keys: &mut Keys<'_, '_>) {
-    let width = (east - west).rem_euclid(360.0);
-    if width > 180.0
+    if let Some(width) = suspicious_width_deg([west, east])
         && let Some(span) = keys.span_of("longitude_deg")
     {
         keys.review().warn(
@@ -233,6 +323,24 @@ mod tests {
         for refused in [[10.0, 10.0], [360.0, 0.0], [-180.0, 181.0]] {
             assert_eq!(wrapped_longitudes(refused), None, "{refused:?}");
         }
+    }
+
+    #[test]
+    fn boxes_of_older_maps_mean_the_same_ground() {
+        let older = BoxCoordinates {
+            longitude: LongitudeSense::West,
+            latitude: LatitudeKind::Areographic,
+        };
+        let [west, east] = older.east_deg([184.95, 184.45]);
+        // Degrees; rounding of the sum with 360.
+        let wrapped = wrapped_longitudes([west, east]).unwrap();
+        assert!((wrapped[0] - 175.05).abs() + (wrapped[1] - 175.55).abs() < 1e-12);
+        let [south, equator] = older.areocentric_deg([-15.27, 0.0]);
+        // tan(areocentric) = (c/a)² tan(areographic), a = 3396.19 km and c = 3376.20 km (IAU 2000).
+        let tangent = 15.27_f64.to_radians().tan() * (3376.20_f64 / 3396.19).powi(2);
+        assert!((south + tangent.atan().to_degrees()).abs() < 1e-12);
+        assert!(equator.abs() < 1e-300);
+        assert_eq!(older.areocentric_deg([-90.0, 90.0]), [-90.0, 90.0]);
     }
 
     #[test]

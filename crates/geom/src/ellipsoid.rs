@@ -31,6 +31,18 @@ impl AreocentricLatitude {
     }
 }
 
+impl AreographicLatitude {
+    /// The direction of the ellipsoid point with this areographic latitude, with the radii of `model`.
+    ///
+    /// `tan(areocentric) = (c/a)² tan(areographic)`.
+    #[must_use]
+    pub fn to_areocentric(self, model: &BodyModel) -> AreocentricLatitude {
+        let (sin, cos) = self.0.sin_cos();
+        let ratio = model.polar_radius_m / model.equatorial_radius_m;
+        AreocentricLatitude((ratio * ratio * sin).atan2(cos))
+    }
+}
+
 /// Areocentric spherical coordinates.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Spherical {

@@ -40,7 +40,7 @@ create_exception!(
     areograph,
     InputError,
     AreographError,
-    "Invalid content of input files (exit code 3)."
+    "Missing input files, or invalid content (exit code 3)."
 );
 create_exception!(
     areograph,

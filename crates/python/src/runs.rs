@@ -3,14 +3,15 @@
 use std::{
     path::{Path, PathBuf},
     process::ExitCode,
+    sync::atomic::AtomicBool,
 };
 
 use areograph::{
     config::{Document as _, SiteConfig, built_in_instruments},
     error::Result,
     flow::{
-        PUBLISH, RunOptions, Task, check_answer, check_out, check_site, plan_answer, plan_site,
-        publish_sites, run_answer, run_site,
+        Extent, PUBLISH, RunOptions, Task, check_answer, check_out, check_site, plan_answer,
+        plan_site, publish_sites, run_answer, run_site,
     },
     pds::read_label,
     service::start::set_program,
@@ -46,6 +47,23 @@ fn load(site: &Path) -> Result<(SiteConfig, Vec<String>)> {
     Ok((loaded.config, warnings))
 }
 
+fn options<'a>(
+    out: &Path,
+    force: bool,
+    stop: &'a AtomicBool,
+    hashes: &'a HashCache,
+) -> RunOptions<'a> {
+    RunOptions {
+        out: out.to_owned(),
+        until: PUBLISH,
+        force,
+        stop,
+        hashes,
+        roots: &[],
+        observer: &(),
+    }
+}
+
 /// A JSON answer, and warnings on the configuration.
 type Answered = (String, Vec<String>);
 
@@ -55,16 +73,8 @@ pub(crate) fn run(py: Python<'_>, site: PathBuf, out: PathBuf, force: bool) -> P
     interruptible(py, |stop| {
         let (config, warnings) = load(&site)?;
         check_out(&out, std::slice::from_ref(&config))?;
-        let options = RunOptions {
-            out: out.clone(),
-            until: PUBLISH,
-            force,
-            stop,
-            hashes: &HashCache::in_folder(&out, false),
-            roots: &[],
-            observer: &(),
-        };
-        let outcome = run_site(&config, &options)?;
+        let hashes = HashCache::in_folder(&out, false);
+        let outcome = run_site(&config, &options(&out, force, stop, &hashes))?;
         publish_sites(&out)?;
         Ok((run_answer(&outcome).to_string(), warnings))
     })
@@ -76,16 +86,8 @@ pub(crate) fn plan(py: Python<'_>, site: PathBuf, out: PathBuf) -> PyResult<Answ
     interruptible(py, |stop| {
         let (config, warnings) = load(&site)?;
         check_out(&out, std::slice::from_ref(&config))?;
-        let options = RunOptions {
-            out: out.clone(),
-            until: PUBLISH,
-            force: false,
-            stop,
-            hashes: &HashCache::in_folder(&out, false),
-            roots: &[],
-            observer: &(),
-        };
-        let plan = plan_site(&config, &options)?;
+        let hashes = HashCache::in_folder(&out, false);
+        let plan = plan_site(&config, &options(&out, false, stop, &hashes))?;
         Ok((
             plan_answer(Task::Site(&config), &plan).to_string(),
             warnings,
@@ -95,10 +97,12 @@ pub(crate) fn plan(py: Python<'_>, site: PathBuf, out: PathBuf) -> PyResult<Answ
 
 /// Examines a site; the answer is that of `areograph check --json`.
 #[pyfunction]
-pub(crate) fn check(py: Python<'_>, site: PathBuf, out: PathBuf) -> PyResult<Answered> {
-    interruptible(py, |_| {
+pub(crate) fn check(py: Python<'_>, site: PathBuf, out: PathBuf, full: bool) -> PyResult<Answered> {
+    interruptible(py, |stop| {
         let (config, warnings) = load(&site)?;
-        let mut checked = check_site(&config, &HashCache::in_folder(&out, false));
+        let hashes = HashCache::in_folder(&out, false);
+        let extent = if full { Extent::Full } else { Extent::Inputs };
+        let mut checked = check_site(&config, extent, &options(&out, false, stop, &hashes));
         let apart = check_out(&out, std::slice::from_ref(&config));
         checked.failures.splice(0..0, apart.err());
         Ok((check_answer(&config.site, &checked).to_string(), warnings))

@@ -24,6 +24,7 @@ use areograph_base::{
     body::Datum,
     error::{IoError, Locate, Result},
     time::{Et, Interval},
+    watch::Watch,
 };
 use areograph_config::usual_altimeter;
 use areograph_pds::pedr::{LabelInfo, PedrWriter, RECORD_BYTES};
@@ -135,9 +136,15 @@ struct ArchiveFileTruth {
 ///
 /// The same options give the same bytes with any number of threads. Coordinates are IAU 2000, as in files of version L.
 ///
+/// * `watch` – counts the files
+///
 /// # Errors
 /// Too few or too many days; a folder that holds something else; errors of writing.
-pub fn write_archive(directory: &Path, options: &ArchiveOptions) -> Result<ArchiveSummary> {
+pub fn write_archive(
+    directory: &Path,
+    options: &ArchiveOptions,
+    watch: Watch<'_>,
+) -> Result<ArchiveSummary> {
     let days = f64::from(options.days);
     let [least, most] = DAYS;
     if !(least..=most).contains(&days) {
@@ -160,10 +167,13 @@ pub fn write_archive(directory: &Path, options: &ArchiveOptions) -> Result<Archi
     write_archive_kernels(&draft.folder("kernels")?, &orbit, &spans)?;
     let terrain = Terrain::new(options.seed, &[], Relief::Gentle);
     let pedr = draft.folder("pedr")?;
-    let written: Vec<ArchiveFileTruth> = files
-        .par_iter()
-        .map(|file| file.write(&pedr, &orbit, &terrain))
-        .collect::<Result<_>>()?;
+    watch.announce(files.len());
+    let written = files.par_iter().map(|file| {
+        let written = file.write(&pedr, &orbit, &terrain);
+        watch.step(1, "PEDR files");
+        written
+    });
+    let written: Vec<ArchiveFileTruth> = written.collect::<Result<_>>()?;
     let frames = written.iter().map(|file| file.frames).sum();
     write_truth(&draft, options, written)?;
     draft.finish()?;

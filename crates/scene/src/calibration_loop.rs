@@ -17,6 +17,7 @@ use super::{
 use areograph_base::{
     error::{Locate as _, Result},
     units::RADIANS_PER_DEGREE,
+    watch::Watch,
 };
 
 const README: &str = "Three lines of a camera in one orbit: support data (isd/), pixels (images/), PEDR files of laser passes in two\n\
@@ -161,15 +162,19 @@ struct Checked {
 ///
 /// # Errors
 /// [`SceneError`](super::SceneError) when the folder holds something else; errors of writing.
-pub fn write_calibration_loop_scene(directory: &Path, seed: u64) -> Result<String> {
-    write_line_scene(directory, &LineScene::of_seed(seed))
+pub fn write_calibration_loop_scene(
+    directory: &Path,
+    seed: u64,
+    watch: Watch<'_>,
+) -> Result<String> {
+    write_line_scene(directory, &LineScene::of_seed(seed), watch)
 }
 
 /// Writes such a scene of another size, or one with exact support data.
 ///
 /// # Errors
 /// Those of [`write_calibration_loop_scene`].
-pub fn write_line_scene(directory: &Path, scene: &LineScene) -> Result<String> {
+pub fn write_line_scene(directory: &Path, scene: &LineScene, watch: Watch<'_>) -> Result<String> {
     let seed = scene.seed;
     let draft = Draft::begin(directory, README)?;
     let [isd, images, pedr] = ["isd", "images", "pedr"].map(|folder| draft.folder(folder));
@@ -182,11 +187,12 @@ pub fn write_line_scene(directory: &Path, scene: &LineScene) -> Result<String> {
         terrain: &terrain,
         seed,
     };
+    watch.announce(lines.len() * orbit.size[0] as usize);
     for line in &lines {
         let path = isd.join(format!("{}.json", line.name));
         put(&path, &orbit.support_data(line)).in_file(&path)?;
         let path = images.join(format!("{}.tif", line.name));
-        rendered.write(&path, line).in_file(&path)?;
+        rendered.write(&path, line, watch).in_file(&path)?;
     }
     passes.write(&pedr, &terrain, seed)?;
     let truth = Truth {

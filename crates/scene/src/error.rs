@@ -28,6 +28,10 @@ pub enum SceneError {
         /// Path below the folder.
         file: String,
     },
+    /// The folder holds a scene of another kind, or of another version.
+    #[error("the folder contains a scene of another kind, or of another version of areograph")]
+    #[cause(Configuration: "choose another folder, or remove this one")]
+    Other,
     /// No orbit shows the site as planned.
     #[error(
         "no orbit found that shows {image} as planned: last step {step} rad after {iterations} iterations, expected below 1e-13 rad"

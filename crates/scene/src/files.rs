@@ -36,7 +36,9 @@ impl Draft {
     /// # Errors
     /// [`SceneError`] when `directory` contains anything except an unchanged scene; errors of writing.
     pub(super) fn begin(directory: &Path, readme: &str) -> Result<Self> {
+        let readme = format!("{README_LINE}\n\n{readme}");
         refuse_foreign(directory)?;
+        refuse_other(directory, &readme)?;
         let final_place = path::absolute(directory)
             .map_err(IoError::on("resolve"))
             .in_file(directory)?;
@@ -50,7 +52,7 @@ impl Draft {
         fs::create_dir(&folder)
             .map_err(IoError::on("create"))
             .in_file(&folder)?;
-        put(&folder.join(README), &format!("{README_LINE}\n\n{readme}"))?;
+        put(&folder.join(README), &readme)?;
         Ok(Self {
             final_place,
             workshop,
@@ -158,6 +160,14 @@ fn refuse_foreign(folder: &Path) -> Result<()> {
     Ok(())
 }
 
+/// Rejects a scene of another kind, whose introduction differs.
+fn refuse_other(folder: &Path, readme: &str) -> Result<()> {
+    match fs::read_to_string(folder.join(README)) {
+        Ok(other) if other != readme => Err(SceneError::Other).in_file(folder),
+        _ => Ok(()),
+    }
+}
+
 /// Files, folders and links below `folder` by their path from there, with `/`; empty without a folder.
 fn below(folder: &Path) -> Result<BTreeMap<String, PathBuf>> {
     let mut found = BTreeMap::new();
@@ -210,6 +220,20 @@ mod tests {
         // A scene with a missing file is still a scene.
         fs::remove_file(place.join("sites/a.toml")).unwrap();
         write_scene(&place, "three");
+    }
+
+    #[test]
+    fn a_scene_of_another_kind_is_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let place = folder.path().join("mission");
+        write_scene(&place, "truth");
+        let refused = Draft::begin(&place, "An archive.").err().unwrap();
+        assert!(
+            refused
+                .to_string()
+                .contains("contains a scene of another kind")
+        );
+        assert!(place.join("truth.json").exists());
     }
 
     #[test]

@@ -13,6 +13,7 @@ use super::{drawn::Flown, error::SceneError, terrain::Terrain, truth::RenderedTr
 use areograph_base::{
     error::{IoError, Locate as _, Result},
     units::SECONDS_PER_MS,
+    watch::Watch,
 };
 use areograph_config::usual_instrument;
 use areograph_pds::image_file::{Coding, NewImage, Predictor, Transform, encode};
@@ -68,15 +69,23 @@ pub(super) fn write_images(
     terrain: &Terrain,
     (seed, coder): (u64, Coder),
     session: &Session,
+    watch: Watch<'_>,
 ) -> Result<Vec<RenderedTruth>> {
+    let delivered = |flown: &&&Flown| flown.arc.image.is_delivered();
+    for flown in days.iter().filter(delivered) {
+        watch.announce(flown.arc.image.lines_delivered as usize / 16 * 16);
+    }
     let mut truth = Vec::new();
-    for flown in days.iter().filter(|flown| flown.arc.image.is_delivered()) {
+    for flown in days.iter().filter(delivered) {
         let planned = flown.arc.image;
         let camera = Rendering::new(flown, terrain, seed)?;
         let lines = planned.lines_delivered / 16 * 16;
         let starts: Vec<u32> = (0..lines).step_by(STRIP_LINES as usize).collect();
         let strips = starts.into_par_iter().map(|first| {
-            camera.pixels(first..lines.min(first + STRIP_LINES), 0..planned.samples())
+            let end = lines.min(first + STRIP_LINES);
+            let strip = camera.pixels(first..end, 0..planned.samples());
+            watch.step(u64::from(end - first), "image lines");
+            strip
         });
         let strips: Vec<Vec<u8>> = strips.collect::<Result<_>>()?;
         let stop = session.et_to_utc(flown.arc.exposed.stop)?;

@@ -13,7 +13,10 @@ use super::{
     terrain::Terrain,
     value_noise::noise,
 };
-use areograph_base::error::{Error, IoError, Result};
+use areograph_base::{
+    error::{Error, IoError, Result},
+    watch::Watch,
+};
 use areograph_geom::ellipsoid::local_axes;
 
 /// Spacings of the lattices of albedo, metres: the finest is two pixels.
@@ -45,9 +48,9 @@ impl LineImages<'_> {
     ///
     /// # Errors
     /// A pixel that does not see the ground; errors of writing.
-    pub(super) fn write(&self, path: &Path, line: &StereoLine) -> Result<()> {
+    pub(super) fn write(&self, path: &Path, line: &StereoLine, watch: Watch<'_>) -> Result<()> {
         let [lines, samples] = self.orbit.size;
-        let pixels = self.pixels(line)?;
+        let pixels = self.pixels(line, watch)?;
         let file = File::create(path).map_err(IoError::on("create"))?;
         let written = TiffEncoder::new(BufWriter::new(file))
             .and_then(|mut encoder| encoder.write_image::<Gray8>(samples, lines, &pixels));
@@ -59,12 +62,14 @@ impl LineImages<'_> {
         })
     }
 
-    fn pixels(&self, line: &StereoLine) -> Result<Vec<u8>> {
+    fn pixels(&self, line: &StereoLine, watch: Watch<'_>) -> Result<Vec<u8>> {
         let lines = self.orbit.size[0];
         let starts: Vec<u32> = (0..lines).step_by(STRIP as usize).collect();
         let strips = starts.into_par_iter().map(|start| {
             let end = (start + STRIP).min(lines);
-            self.strip(line, start..end)
+            let strip = self.strip(line, start..end);
+            watch.step(u64::from(end - start), "image lines");
+            strip
         });
         let strips: Vec<Vec<u8>> = strips.collect::<Result<_>>()?;
         Ok(strips.concat())

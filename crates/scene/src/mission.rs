@@ -32,6 +32,7 @@ use areograph_base::{
     body::{Datum, MARS_IAU2000},
     error::{IoError, Locate, Result},
     time::Et,
+    watch::Watch,
 };
 use areograph_geom::{body_rotation::body_matrix, ellipsoid::Spherical};
 use areograph_pds::ties::ties_table;
@@ -57,14 +58,17 @@ pub fn write_scene(directory: &Path, options: &SceneOptions) -> Result<SceneSumm
 /// Writes a scene with the pixels of the narrow-angle images (`images/*.imq`, named in the site files), which takes
 /// minutes.
 ///
+/// * `watch` – counts the lines of the images
+///
 /// # Errors
 /// As [`write_scene`].
 pub fn write_scene_with_images(
     directory: &Path,
     options: &SceneOptions,
     coder: Coder,
+    watch: Watch<'_>,
 ) -> Result<SceneSummary> {
-    write(directory, options, Some((coder, &SITES[..])))
+    write(directory, options, Some((coder, &SITES[..], watch)))
 }
 
 /// The ground of the mission that [`write_scene`] writes.
@@ -91,7 +95,7 @@ impl TrueGround {
 pub(super) fn write(
     directory: &Path,
     options: &SceneOptions,
-    images: Option<(Coder, &[&Site])>,
+    images: Option<(Coder, &[&Site], Watch<'_>)>,
 ) -> Result<SceneSummary> {
     check(options)?;
     let draft = Draft::begin(directory, README)?;
@@ -133,7 +137,7 @@ pub(super) fn write(
             let noise = TieNoise::of(&options.errors);
             let pair = write_ties(&ties, [first, second], &terrain, noise, options.seed)?;
             let arcs = [&first.arc, &second.arc];
-            let has_pixels = images.is_some_and(|(_, sites)| is_of(site, sites));
+            let has_pixels = images.is_some_and(|(_, sites, _)| is_of(site, sites));
             let passes: Vec<&FurtherPass> = passes
                 .iter()
                 .filter(|pass| pass.site.id == site.id)
@@ -144,13 +148,13 @@ pub(super) fn write(
         }
     }
     truth.wide_angle = write_context(&draft, &days, &kept, &terrain, options)?;
-    if let Some((coder, sites)) = images {
+    if let Some((coder, sites, watch)) = images {
         let session = clock_session(&draft.folder("kernels")?)?;
         let folder = draft.folder("images")?;
         let how = (options.seed, coder);
         let shown = |flown: &&Flown| is_of(flown.arc.image.site, sites);
         let days: Vec<&Flown> = days.iter().filter(shown).collect();
-        truth.rendered = write_images(&folder, &days, &terrain, how, &session)?;
+        truth.rendered = write_images(&folder, &days, &terrain, how, &session, watch)?;
     }
     write_truth(&draft, &truth)?;
     draft.finish()?;

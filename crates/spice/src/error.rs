@@ -37,7 +37,11 @@ pub enum SpiceError {
     NotIso(String),
     /// The file is not a kernel that can be loaded.
     #[error("is {found}; expected {expected}")]
-    #[cause("fetch the kernel again from NAIF, or correct the list of kernels")]
+    #[cause("{}", if found.starts_with("a folder") {
+        "name a metakernel, or kernels one by one"
+    } else {
+        "fetch the kernel again from NAIF, or correct the list of kernels"
+    })]
     NotAKernel {
         /// The kind of the file.
         found: String,

@@ -72,10 +72,11 @@ pub struct KernelSet {
 }
 
 impl KernelSet {
-    /// The kernels of a metakernel, if this is the only file and ends in `.tm`, else these kernels in load order.
+    /// The kernels of a metakernel, if this is the only file and ends in `.tm`; all kernels of a folder, if it is the only
+    /// path, in the order of [`Self::select`]; else these kernels in load order.
     ///
     /// # Errors
-    /// As of [`Self::from_metakernel`] and [`Self::from_files`].
+    /// As of [`Self::from_metakernel`] and [`Self::from_files`]; a folder without a kernel.
     pub fn named(files: &[PathBuf]) -> Result<Self> {
         let is_metakernel = |path: &PathBuf| {
             let ending = path.extension();
@@ -83,6 +84,7 @@ impl KernelSet {
         };
         match files {
             [one] if is_metakernel(one) => Self::from_metakernel(one),
+            [folder] if folder.is_dir() => Self::in_folder(folder),
             files => Self::from_files(files),
         }
     }
@@ -205,7 +207,7 @@ pub(super) fn role_of(path: &Path) -> Result<KernelRole> {
     daf::segments(path).map(|_| role)
 }
 
-fn not_a_kernel<T>(path: &Path, found: &str) -> Result<T> {
+pub(super) fn not_a_kernel<T>(path: &Path, found: &str) -> Result<T> {
     Err(SpiceError::NotAKernel {
         found: found.to_owned(),
         expected: EXPECTED,
@@ -219,7 +221,12 @@ fn first_bytes(path: &Path) -> Result<Vec<u8>> {
         .map_err(IoError::on("open kernel"))
         .in_file(path)?;
     if !metadata.is_file() {
-        return not_a_kernel(path, "not a regular file");
+        let found = if metadata.is_dir() {
+            "a folder"
+        } else {
+            "not a regular file"
+        };
+        return not_a_kernel(path, found);
     }
     let mut start = Vec::new();
     File::open(path)

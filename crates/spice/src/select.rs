@@ -9,7 +9,7 @@ use super::{
     coverage::{RequiredCoverage, interval_of},
     daf::{self, Segment},
     error::{SUN_LIGHT_S, SpiceError},
-    kernels::{KernelSet, read_text, role_of},
+    kernels::{KernelSet, not_a_kernel, read_text, role_of},
     needs::{MARS, Need, defines, needs},
     role::KernelRole,
     session::Session,
@@ -57,6 +57,26 @@ impl KernelSet {
         required: &RequiredCoverage,
     ) -> Result<Self> {
         Self::select_of(&InputFiles::default(), selection, cameras, required)
+    }
+
+    /// All kernels of a folder, text kernels first, then ephemerides and attitudes, each by name. A site chooses among them.
+    ///
+    /// # Errors
+    /// [`SpiceError::NotAKernel`] for a folder without a kernel; [`IoError`] when the folder cannot be read.
+    pub(super) fn in_folder(folder: &Path) -> Result<Self> {
+        let run = InputFiles::default();
+        let found = Found::in_folder(folder, &run)?;
+        let texts = found.texts.iter().map(|(path, _)| path);
+        let ephemerides = found.ephemerides.iter().map(|(path, _)| path);
+        let mut set = Self::default();
+        for path in texts.chain(ephemerides).chain(&found.attitudes) {
+            set.add(path, "in the folder", &run)?;
+        }
+        if set.kernels.is_empty() {
+            return not_a_kernel(folder, "a folder without kernels");
+        }
+        set.explanation.extend(found.notes);
+        Ok(set)
     }
 
     /// Like [`Self::select`], with the hashes that a run has of its input files.

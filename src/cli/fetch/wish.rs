@@ -2,6 +2,7 @@
 
 use super::{Arguments, Kind};
 use crate::{
+    cli::files::{CONFIGURATIONS, expand},
     error::Result,
     fetch::{
         FetchError, Utc,
@@ -65,10 +66,11 @@ pub(super) fn needs(arguments: &Arguments) -> Result<Needs> {
             place: ImagePlace::Folder(into.join("images")),
         });
     }
-    for path in &arguments.sites {
+    for path in &expand(&arguments.sites, &CONFIGURATIONS)? {
         wanted.add_site(path)?;
     }
-    if let Some(edges_deg) = arguments.edges_deg {
+    if let Some(edges) = arguments.edges_deg {
+        let edges_deg = arguments.meaning.edges_deg(edges)?;
         let table = shots_of_box(&into.join("shots"), edges_deg);
         wanted.wish.shots.push(table);
     }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use crate::{
-    cli::output,
+    cli::{output, progress::Progress},
     config::all_instruments,
     error::{Cause, Locate as _, Result},
     files::require_apart,
@@ -76,6 +76,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
     let mask_format = arguments.mask.as_deref().map(self::format).transpose()?;
     let outputs = std::iter::once(&arguments.out).chain(&arguments.mask);
     require_apart(outputs.map(PathBuf::as_path), [arguments.file.as_path()])?;
+    let progress = Progress::of_work("image extract");
     let image = PixelFile::open(&arguments.file, all_instruments())?;
     let (mut lines, mut odd_even, mut complaints) = (
         0,
@@ -124,6 +125,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
     if let Some(mask) = mask {
         mask.finish()?;
     }
+    drop(progress);
     if complaints > 0 {
         tracing::warn!(
             "{complaints} complaints about {}; `areograph image info` lists them",

@@ -6,7 +6,10 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use crate::{
-    cli::output,
+    cli::{
+        files::{IMAGES, expand},
+        output,
+    },
     config::{all_instruments, built_in_instruments},
     error::Error,
     pds::{
@@ -31,7 +34,8 @@ use crate::{
 #[derive(Debug, Args)]
 #[command(after_help = "Example: areograph image info e0202855.imq --json")]
 pub(super) struct Arguments {
-    /// Image files of the archive (.imq, .img; of HRSC level 2), ISIS cubes, TIFF or PNG of one band of grey.
+    /// Image files of the archive (.imq, .img; of HRSC level 2), ISIS cubes, TIFF or PNG of one band of grey; folders or
+    /// globs of them.
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
     /// Print JSON.
@@ -44,7 +48,7 @@ const COMPLAINTS_PRINTED: usize = 20;
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     let (mut answers, mut failures) = (Vec::new(), Vec::new());
-    for path in &arguments.files {
+    for path in &expand(&arguments.files, &IMAGES)? {
         match info(path) {
             Ok(answer) if arguments.json => answers.push(answer),
             Ok(answer) => print(&answer),

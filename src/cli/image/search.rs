@@ -71,7 +71,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
             "{undecided} pairs may be from one orbit: the index states neither orbits nor times of both images"
         );
     }
-    match arguments.format {
+    let format = if arguments.json {
+        Format::Geojson
+    } else {
+        arguments.format
+    };
+    match format {
         Format::Table => show::table(&found, &pairs),
         Format::Csv => show::csv(&found),
         Format::Pairs => show::pairs_csv(&pairs),

@@ -114,7 +114,7 @@ pub(super) fn run(arguments: &Arguments, folder: &Path) -> Result<(), Error> {
         .clone()
         .unwrap_or_else(|| identifier(&file_name(folder)));
     let edges_deg = match arguments.edges_deg {
-        Some(edges_deg) => edges_deg,
+        Some(written) => arguments.meaning.edges_deg(written)?,
         None => place(name)?.edges_deg(),
     };
     let file = arguments.folder.join(format!("{site}.toml"));

@@ -8,9 +8,10 @@ use std::{
 };
 
 use clap::Args;
+use serde_json::json;
 
-use crate::cli::output;
 use crate::{
+    cli::{output, progress::Progress},
     error::{Cause, Error, IoError, Locate as _},
     files::{Identity, hash_file, require_own, short_hash},
     pds::archive::{INDEX, INDEX_MARK, Index, IndexedFile, Listing},
@@ -30,7 +31,16 @@ pub(super) struct Arguments {
     /// Read every file again, and list the files whose content differs from the index.
     #[arg(long)]
     verify: bool,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
 }
+
+/// A folder without a PEDR file.
+#[derive(Debug, thiserror::Error, Cause)]
+#[error("the folder contains no PEDR file (*.b)")]
+#[cause(Input: "name the folder of the archive")]
+struct NoFiles;
 
 /// A file that changed without a trace in the file system.
 #[derive(Debug, thiserror::Error, Cause)]
@@ -62,20 +72,32 @@ struct Outcome {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
+    // Nothing is created for a mistyped path.
+    fs::read_dir(&arguments.folder)
+        .map_err(IoError::on("list"))
+        .in_file(&arguments.folder)?;
     let path = arguments.folder.join(INDEX);
     require_own(&path, &INDEX_MARK)?;
     let earlier = Index::read(&path).unwrap_or_default();
-    let listing = Listing::below(&arguments.folder);
+    let mut listing = Listing::below(&arguments.folder);
     let unseen = unseen(&earlier, &arguments.folder, &listing.failures);
+    if listing.paths.is_empty() && earlier.files().next().is_none() {
+        let failure = listing.failures.pop();
+        return Err(failure.unwrap_or_else(|| Error::from(NoFiles).in_file(&arguments.folder)));
+    }
     let mut outcome = Outcome {
         failures: listing.failures,
         ..Outcome::default()
     };
-    for file in &listing.paths {
-        if let Err(failure) = outcome.add(arguments, &earlier, file) {
-            outcome.failures.push(failure);
+    Progress::of_work("pedr index").watch("reading", |watch| {
+        watch.announce(listing.paths.len());
+        for file in &listing.paths {
+            if let Err(failure) = outcome.add(arguments, &earlier, file) {
+                outcome.failures.push(failure);
+            }
+            watch.step(1, "files");
         }
-    }
+    });
     let unseen_paths = unseen.iter().map(|file| arguments.folder.join(file.path()));
     let still: BTreeSet<PathBuf> = listing.paths.iter().cloned().chain(unseen_paths).collect();
     let gone = earlier
@@ -86,11 +108,22 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     let index: Index = unseen.into_iter().chain(outcome.files).collect();
     let encoded = index.encode().ok_or(NotEncoded).in_file(&path)?;
     atomic::replace(&path, &encoded, INDEX_MARK)?;
-    output::line(format_args!(
-        "{}: {files} files of {bytes} bytes, {read} of them read now, {gone} removed; index of {} bytes",
-        path.display(),
-        encoded.len()
-    ));
+    if arguments.json {
+        output::json(&json!({
+            "index": path,
+            "bytes": encoded.len(),
+            "files": files,
+            "bytes_of_files": bytes,
+            "read": read,
+            "removed": gone,
+        }));
+    } else {
+        output::line(format_args!(
+            "{}: {files} files of {bytes} bytes, {read} of them read now, {gone} removed; index of {} bytes",
+            path.display(),
+            encoded.len()
+        ));
+    }
     let mut failures = outcome.failures.into_iter();
     let Some(first) = failures.next() else {
         return Ok(());

@@ -11,7 +11,10 @@ use serde_json::{Value, json};
 
 use super::tables::TableCounts;
 use crate::{
-    cli::output,
+    cli::{
+        files::{PEDR_FILES, expand},
+        output,
+    },
     error::{Error, Locate as _},
     flow::instant_of_table,
     geom::statistics::Summary,
@@ -31,7 +34,7 @@ use crate::{
 #[derive(Debug, Args)]
 #[command(after_help = "Example: areograph pedr info pedr/*.b")]
 pub(super) struct Arguments {
-    /// PEDR files (AP#####v.B), and tables of the Orbital Data Explorer's PEDR query.
+    /// PEDR files (AP#####v.B), folders or globs of them, and tables of the Orbital Data Explorer's PEDR query.
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
     /// Leap seconds (LSK, such as naif0012.tls): shows the time span in UTC as well.
@@ -53,7 +56,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
         None => None,
     };
     let (mut answers, mut useless) = (Vec::new(), Vec::new());
-    for path in &arguments.files {
+    for path in &expand(&arguments.files, &PEDR_FILES)? {
         if is_ode_pedr(path).unwrap_or(false) {
             match info_of_table(path, clock.as_ref()) {
                 Ok(answer) if arguments.json => answers.push(answer),
@@ -171,7 +174,11 @@ fn print(counts: Option<&Counts>, answer: &Value) {
                 }
                 continue;
             }
-            _ => value.to_string(),
+            _ => match value {
+                Value::String(text) => text.clone(),
+                Value::Null => "not stated".to_owned(),
+                other => other.to_string(),
+            },
         };
         line(key, counted);
     }

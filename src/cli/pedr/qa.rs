@@ -7,6 +7,7 @@ use clap::Args;
 use crate::{
     altimetry::MolaClock,
     cli::{
+        files::exist,
         report,
         single::{self, RunArguments},
     },
@@ -78,7 +79,9 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
             .num_threads(usize::from(threads.get()))
             .build_global();
     }
-    let clock = refuse_tables(&arguments.paths).and_then(|()| Ok(arguments.clock()?));
+    let clock = exist(&arguments.paths)
+        .and_then(|()| refuse_tables(&arguments.paths))
+        .and_then(|()| Ok(arguments.clock()?));
     let clock = match clock {
         Ok(clock) => clock,
         Err(failure) => return report(&failure),

@@ -2,6 +2,10 @@
 
 mod arguments;
 
+use std::path::Path;
+
+use serde_json::Value;
+
 pub(super) use self::arguments::Arguments;
 use crate::{
     cli::{output, stop::Signals},
@@ -22,6 +26,46 @@ impl ShotSink for Out {
             Some(file) => file.write(shots, windows),
             None => Ok(()),
         }
+    }
+}
+
+/// Windows whose counts are printed.
+const WINDOWS_MAX: usize = 20;
+
+/// The answer for people: counts, completeness, and the file.
+fn print(statement: &Value, out: Option<&Path>) {
+    let count = |of: &Value| of.as_u64().unwrap_or(0);
+    let list = |name: &str| statement[name].as_array().map_or(&[][..], Vec::as_slice);
+    let windows = list("windows");
+    if windows.len() > 1 {
+        for window in windows.iter().take(WINDOWS_MAX) {
+            let id = window["id"].as_str().unwrap_or_default();
+            output::line(format_args!("{id}: {} shots", count(&window["shots"])));
+        }
+        if windows.len() > WINDOWS_MAX {
+            let more = windows.len() - WINDOWS_MAX;
+            output::line(format_args!("… and {more} more windows (--json lists all)"));
+        }
+    }
+    let (rows, files, read) = (
+        count(&statement["rows"]),
+        list("files").len(),
+        count(&statement["frames_read"]),
+    );
+    let is_complete = statement["complete"].as_bool().unwrap_or(false);
+    let incomplete = if is_complete { "" } else { "; INCOMPLETE" };
+    output::line(format_args!(
+        "{rows} shots in the windows; {files} files searched, {read} records read{incomplete}"
+    ));
+    let rejected = statement["rejected"].as_object().into_iter().flatten();
+    let rejected: Vec<String> = rejected
+        .map(|(reason, shots)| format!("{reason}: {}", count(shots)))
+        .collect();
+    if !rejected.is_empty() {
+        output::line(format_args!("shots left out: {}", rejected.join(", ")));
+    }
+    if let Some(out) = out {
+        output::line(format_args!("{}: written", out.display()));
     }
 }
 
@@ -57,10 +101,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
     if let Out(Some(file)) = out {
         file.finish(&answer.statement)?;
     }
-    output::json(&answer.statement);
+    if arguments.json {
+        output::json(&answer.statement);
+    } else {
+        print(&answer.statement, arguments.out.as_deref());
+    }
     if answer.complaints > 0 {
         tracing::warn!(
-            "{} complaints: invalid records are skipped; `complaints` of the answer counts them by reason, \
+            "{} complaints: invalid records are skipped; with --json, `complaints` counts them by reason, and \
              `first_complaints` lists the first {COMPLAINTS_MAX}",
             answer.complaints
         );

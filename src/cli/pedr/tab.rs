@@ -10,7 +10,11 @@ use std::{
 use clap::{Args, ValueEnum};
 
 use crate::{
-    cli::{output, stop::Signals},
+    cli::{
+        files::{PEDR_FILES, expand},
+        output,
+        stop::Signals,
+    },
     error::{Cause, IoError, Locate as _, Result, Stopped},
     files::{Mark, MarkAt, StagedFile, require_apart},
     pds::{
@@ -186,6 +190,9 @@ fn read_preferences(named: Option<&Path>) -> Result<Preferences> {
 
 /// The files to read, and whether they come from a list. Names in a list without `.b` or `.B` are skipped with a line.
 fn files(input: &Path) -> Result<(Vec<PathBuf>, bool)> {
+    if input.is_dir() {
+        return Ok((expand(&[input.to_owned()], &PEDR_FILES)?, true));
+    }
     let is_pedr = |name: &str| name.contains(".b") || name.contains(".B");
     if is_pedr(&input.to_string_lossy()) {
         return Ok((vec![input.to_owned()], false));

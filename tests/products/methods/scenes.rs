@@ -4,6 +4,7 @@ use std::{
     fs,
     path::{Path, PathBuf},
     process::Command,
+    sync::atomic::AtomicBool,
 };
 
 use areograph::{
@@ -16,6 +17,7 @@ use areograph::{
         write_line_scene, write_plane_scene, write_scene, write_terrain_model_scene,
     },
     stages::match_laser::{MatchImage, MatchOptions, MatchRequest},
+    watch::Watch,
 };
 
 use crate::common::{
@@ -175,7 +177,12 @@ fn calibrated(folder: &Path) -> PathBuf {
 
 /// Smaller ground has too few places for shots that judge; two rounds call all that more of them call.
 fn write_loop(folder: &Path) {
-    write_calibration_loop_scene(&folder.join("lines"), 1).unwrap();
+    write_calibration_loop_scene(
+        &folder.join("lines"),
+        1,
+        Watch::from(&AtomicBool::new(false)),
+    )
+    .unwrap();
     let path = folder.join("lines/calibration.toml");
     let text = fs::read_to_string(&path).unwrap();
     let (was, is) = ("search_cells = 30", "search_cells = 30\nrounds_max = 2");
@@ -250,7 +257,12 @@ fn write_pair(folder: &Path) {
             size: [lines, 240],
             is_wrong: false,
         };
-        write_line_scene(&folder.join(name), &scene).unwrap();
+        write_line_scene(
+            &folder.join(name),
+            &scene,
+            Watch::from(&AtomicBool::new(false)),
+        )
+        .unwrap();
     }
     let mut search: Command = areograph();
     search.args(["--quiet", "pedr", "search"]);

@@ -13,7 +13,7 @@ use areograph_base::{
 /// A number of files beyond the range of a search.
 #[derive(Debug, thiserror::Error, Cause)]
 #[error("{0} PEDR files; expected 1 to 65535")]
-#[cause(Configuration: "name PEDR files (AP#####v.B), or folders that contain them")]
+#[cause(Input: "name PEDR files (AP#####v.B), or folders that contain them")]
 struct FileCount(usize);
 
 /// Files of an archive that can be searched, and failures of the others.

@@ -42,12 +42,12 @@ class Check:
     """Configuration, inputs and coverage of a site, and the verdict of a run."""
 
     site: str
-    #: Whether a run would succeed with valid products.
+    #: Whether no cause is known that would stop a run or make its products invalid.
     ready: bool
     #: Causes that would stop a run, or make its products invalid, with what to do.
     failures: list[str]
     findings: list[str]
-    #: The verdict of a run, as in the manifest; None if a run would fail.
+    #: The verdict, as in the manifest; None if a run would fail, or if the verdict was not computed.
     verdict: dict[str, Any] | None
 
 
@@ -66,7 +66,7 @@ def plan(site: StrPath, *, out: StrPath = "out") -> Plan:
     return Plan(answer["site"], stages)
 
 
-def check(site: StrPath, *, out: StrPath = "out") -> Check:
+def check(site: StrPath, *, out: StrPath = "out", full: bool = False) -> Check:
     """Examine the configuration, the inputs and the kernel coverage of a site.
 
     Failures are part of the result; only a configuration that cannot be read raises.
@@ -74,9 +74,11 @@ def check(site: StrPath, *, out: StrPath = "out") -> Check:
     Parameters
     ----------
     site, out
-        As of `plan`.
+        As of `plan`. If the products in ``out`` are up to date, the verdict is theirs.
+    full
+        Otherwise compute every stage for the verdict, as a run does; nothing is written.
     """
-    answer = _answer(_native.check(os.fspath(site), os.fspath(out)))
+    answer = _answer(_native.check(os.fspath(site), os.fspath(out), full))
     return Check(
         answer["site"], answer["ready"], answer["failures"], answer["findings"], answer["verdict"]
     )

@@ -64,6 +64,11 @@ pub(super) fn all_levels(
     let mut reach = (reach_m / height_of_sample_m(deepest))
         .ceil()
         .clamp(REACH as f64, REACH_MAX) as usize;
+    // All at once, so that the time left is that of all levels.
+    for times in 0..=deepest {
+        let tiles = tiles(&common.level(views, times)).len();
+        watch.announce(tiles * (1 + STEPS[usize::from(times > 0)]));
+    }
     let mut cells = Vec::new();
     for times in (0..=deepest).rev() {
         let level = common.level(views, times);
@@ -94,16 +99,18 @@ pub(super) fn all_levels(
     Ok(cells)
 }
 
+fn tiles(level: &Level<'_>) -> Vec<Tile> {
+    let edge = (TILE / level.per_cell).max(1);
+    Tile::all(level.ground.size, edge, level.per_cell, MARGIN)
+}
+
 /// Calls `work` for every tile of a level, on all threads; the cells in order.
 fn every_tile(
     level: &Level<'_>,
     watch: Watch<'_>,
     work: impl Fn(Tile) -> Result<Vec<(usize, Cell)>> + Sync,
 ) -> Result<Vec<Cell>> {
-    let edge = (TILE / level.per_cell).max(1);
-    let tiles = Tile::all(level.ground.size, edge, level.per_cell, MARGIN);
-    watch.announce(tiles.len());
-    let worked = tiles.into_par_iter().map(|tile| {
+    let worked = tiles(level).into_par_iter().map(|tile| {
         watch.check()?;
         let worked = work(tile);
         watch.step(1, "tiles");

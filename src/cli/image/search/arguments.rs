@@ -60,6 +60,9 @@ pub(in crate::cli::image) struct Arguments {
     /// Format of the printed answer.
     #[arg(long, value_enum, default_value = "table")]
     pub(super) format: Format,
+    /// Print JSON, as --format geojson.
+    #[arg(long, conflicts_with = "format")]
+    pub(super) json: bool,
 }
 
 /// An unknown camera.

@@ -44,6 +44,9 @@ pub(in crate::cli::pedr) struct Arguments {
     /// Format of the shots; by default from the extension of --out; without --out shots are only counted.
     #[arg(long, value_enum)]
     pub(super) format: Option<Format>,
+    /// Print JSON: the request, the answer with its completeness, and every file.
+    #[arg(long)]
+    pub(super) json: bool,
     /// File to write.
     #[arg(long, value_name = "FILE", required_if_eq_any = [("format", "parquet"), ("format", "csv"), ("format", "geojson")])]
     pub(super) out: Option<PathBuf>,

@@ -12,6 +12,7 @@ use std::{
     collections::BTreeMap,
     fs,
     path::{Path, PathBuf},
+    sync::atomic::AtomicBool,
     time::Instant,
 };
 
@@ -51,7 +52,16 @@ impl Mission {
             ..*options
         };
         let begun = Instant::now();
-        mission::write(folder, &options, Some((Coder::Predictive, sites))).unwrap();
+        mission::write(
+            folder,
+            &options,
+            Some((
+                Coder::Predictive,
+                sites,
+                Watch::from(&AtomicBool::new(false)),
+            )),
+        )
+        .unwrap();
         println!("rendered in {:.1} s", begun.elapsed().as_secs_f64());
         let session = clock_session(&folder.join("kernels")).unwrap();
         let fly = |image| {
