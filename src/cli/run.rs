@@ -27,6 +27,7 @@ use crate::{
         run_answer, run_site,
     },
     products::REPORT,
+    service::words::counted,
     store::{hashes::HashCache, manifest::Manifest},
 };
 
@@ -231,11 +232,12 @@ fn contents(manifest: &Manifest) -> String {
     let count = |name: &str| manifest.counts.get(name).copied().unwrap_or(0);
     let mut parts = Vec::new();
     if count("footprints") > 0 {
-        let (footprints, profiles) = (count("footprints"), count("profiles"));
-        parts.push(format!("{footprints} footprints of {profiles} profiles"));
+        let footprints = counted(count("footprints"), "footprint");
+        let profiles = counted(count("profiles"), "profile");
+        parts.push(format!("{footprints} of {profiles}"));
     }
     if count("images") > 0 {
-        parts.push(format!("{} images", count("images")));
+        parts.push(counted(count("images"), "image"));
     }
     if count("registered") > 0 {
         let (inside, all) = (count("registered_inside"), count("registered"));

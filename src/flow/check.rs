@@ -93,11 +93,12 @@ pub fn rival_sets(config: &SiteConfig) -> Result<Vec<RivalSet>> {
     load_rivals(config, &InputFiles::default()).in_site(&config.site)
 }
 
-/// The products of a run would be invalid.
+/// The products of a run would be invalid, or the present ones are.
 #[derive(Debug, thiserror::Error, Cause)]
-#[error("products are invalid: {reason}")]
+#[error("products {}: {reason}", if *.exist { "are invalid" } else { "would be invalid" })]
 #[cause(Validation: "a run still writes the products, marks them as invalid, and reports the numbers")]
-struct WouldBeInvalid {
+struct Invalid {
+    exist: bool,
     reason: String,
 }
 
@@ -177,7 +178,10 @@ impl<'a> Check<'a> {
     fn judge(&mut self, verdict: Verdict) {
         for reason in &verdict.reasons {
             let reason = reason.clone();
-            let failure = Error::from(WouldBeInvalid { reason });
+            let failure = Error::from(Invalid {
+                exist: self.checked.has_products,
+                reason,
+            });
             self.checked.failures.push(failure.in_site(self.site));
         }
         self.checked.verdict = Some(verdict);

@@ -249,8 +249,9 @@ fn a_change_of_any_set_is_seen_and_may_change_the_choice() {
     let case = rival_case(FAMILIES);
     let planned = |case: &Case| {
         let mut command = case.areograph();
-        command.args(["--quiet", "plan", "site.toml", "--out", "out"]);
-        case.outcome(command)
+        command.args(["-v", "plan", "site.toml", "--out", "out"]);
+        let listed = common::mission::succeed(&mut command).stdout;
+        String::from_utf8(listed).unwrap()
     };
     let first = planned(&case);
     assert!(first.contains("run   choose_kernels"), "{first}");

@@ -200,7 +200,7 @@ fn what_cannot_be_compared_is_refused() {
         3,
         "no manifest.json in this folder or below it",
     );
-    refused(&compared(&["nowhere/at/all"]), 6, "nowhere/at/all");
+    refused(&compared(&["nowhere/at/all"]), 3, "nowhere/at/all");
     refused(
         &compared(&[empty, "--line-time-sigma-ms", "0"]),
         2,

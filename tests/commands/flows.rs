@@ -26,12 +26,12 @@ fn told(case: &Case, arguments: &[&str]) -> String {
 const NET: &str = "net/net.toml";
 const LINES: &str = "lines/calibration.toml";
 
-/// The lines of a plan without their spaces: what happens to each stage, and why.
+/// The lines of a plan without their spaces: a sentence, then what happens to each stage, and why.
 fn plan(case: &Case, arguments: &[&str]) -> Vec<String> {
-    let printed = told(case, arguments);
-    assert!(printed.starts_with("exit 0"), "{printed}");
+    let printed = succeed(case.areograph().arg("-v").args(arguments)).stdout;
     let words = |line: &str| line.split_whitespace().collect::<Vec<_>>().join(" ");
-    printed.lines().skip(1).map(words).collect()
+    let printed = String::from_utf8(printed).unwrap();
+    printed.lines().map(words).collect()
 }
 
 #[test]
@@ -39,10 +39,10 @@ fn a_plan_of_a_net_and_of_a_calibration_says_what_a_run_does() {
     let case = written();
     let both = ["plan", NET, LINES];
     let first = [
-        "synthetic_net:",
+        "synthetic_net: 2 of 2 stages would run: no earlier output",
         "run triangulate no earlier output",
         "run publish no earlier output",
-        "synthetic_lines:",
+        "synthetic_lines: 2 of 2 stages would run: no earlier output",
         "run calibrate no earlier output",
         "run publish no earlier output",
     ];
@@ -59,6 +59,10 @@ fn a_plan_of_a_net_and_of_a_calibration_says_what_a_run_does() {
     let text = String::from_utf8(case.read(LINES)).unwrap();
     case.write(LINES, text + "\n[a_priori]\nlook_px = 40.0\n");
     let dry = plan(&case, &["calibrate", LINES, "--plan"]);
+    assert_eq!(
+        dry[0],
+        "synthetic_lines: 2 of 2 stages would run: key a_priori.look_px changed, key a_priori.look_px is new"
+    );
     assert_eq!(dry[1], "run calibrate key a_priori.look_px changed");
     assert!(dry[2].starts_with("run publish"), "{dry:#?}");
     // The command runs what its plan names, and the other one stands.

@@ -86,7 +86,7 @@ fn inputs(folder: &Path) -> Vec<&'static str> {
     names
 }
 
-const BOX: &str = "--box=-170,170,-60,60";
+const BOX: &str = "--box=-180,180,-60,60";
 
 #[test]
 fn a_search_replaces_only_its_own_answers() {

@@ -242,7 +242,7 @@ fn site_files_of_the_front_pages_are_valid() {
             let file = [
                 "an existing file",
                 "an existing folder",
-                "a glob that matches a file",
+                "a file, a folder or a matching glob",
             ];
             let mut file = file.iter().map(|kind| format!("; expected {kind}"));
             file.any(|kind| line.contains(&kind))

@@ -47,7 +47,7 @@ fn ran() -> Case {
 
 fn plan(case: &Case, further: &[&str]) -> Command {
     let mut command = case.areograph();
-    command.args(["--quiet", "plan", "site.toml", "--out", "out"]);
+    command.args(["-v", "plan", "site.toml", "--out", "out"]);
     command.args(further);
     command
 }

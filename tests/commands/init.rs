@@ -104,6 +104,18 @@ fn tables_of_shots_become_a_site() {
         "tables/two.csv",
         "--box=-0.5,0.31,0.5,1.01",
     ]));
+    let wide = case.outcome(init(
+        &case,
+        &[
+            "wide",
+            "--box=138,137,-5,-4",
+            "--kernels",
+            "kernels/nav.tm",
+            "--pedr",
+            "pedr",
+        ],
+    ));
+    assert!(wide.contains("the other 1°, or give --wide"), "{wide}");
     // Tables without a shot are no place.
     case.write("tables/one.csv", heading);
     case.write("tables/two.csv", heading);

@@ -68,7 +68,7 @@ fn a_killed_search_leaves_nothing_to_the_next() {
             "pedr",
             "search",
             "ap19020l.b",
-            "--box=-170,170,-60,60",
+            "--box=-180,180,-60,60",
         ]);
         command.arg("--out").arg(root.join(out));
         command

@@ -26,9 +26,14 @@ use track::{FRAMES, write};
 const BOX: &str = "--box=-170,170,-60,60";
 
 fn areograph(arguments: &[&str]) -> Output {
+    let of_search: &[&str] = match arguments[0] {
+        "search" => &["--json", "--wide"],
+        _ => &[],
+    };
     Command::new(env!("CARGO_BIN_EXE_areograph"))
         .args(["--quiet", "pedr"])
         .args(arguments)
+        .args(of_search)
         .output()
         .expect("the program")
 }
@@ -270,7 +275,7 @@ fn what_cannot_be_asked_is_refused_with_a_way_out() {
     let empty = folder.path().join("empty");
     fs::create_dir(&empty).unwrap();
     let output = areograph(&["search", text(&empty), BOX]);
-    assert_eq!(output.status.code(), Some(2));
+    assert_eq!(output.status.code(), Some(3));
     let all = json(&areograph(&[
         "search",
         text(&archive),
@@ -438,7 +443,15 @@ fn complaints_are_told_in_a_line() {
             }
         });
         let output = Command::new(env!("CARGO_BIN_EXE_areograph"))
-            .args(["pedr", "search", text(&file), BOX, "--check-all"])
+            .args([
+                "pedr",
+                "search",
+                text(&file),
+                BOX,
+                "--check-all",
+                "--json",
+                "--wide",
+            ])
             .output()
             .unwrap();
         let told = json(&output);

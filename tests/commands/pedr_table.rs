@@ -87,7 +87,7 @@ fn the_command_takes_the_places_of_the_program() {
     // The list ends at a file that is not there: the table as far as it goes, and an error.
     let broken = format!("{}\nno PEDR\nap09999l.b\n{}\n", FILES[0], FILES[1]);
     let (code, said) = run_tab(folder.path(), &broken, &[]);
-    assert_eq!(code, Some(6), "{said}");
+    assert_eq!(code, Some(3), "{said}");
     assert!(
         said.contains("skipping \"no PEDR\"") && said.contains("ap09999l.b: cannot open"),
         "{said}"
@@ -252,7 +252,7 @@ fn tables_take_neither_the_place_of_each_other_nor_of_an_input() {
 fn preferences_that_are_named_are_there_and_their_faults_have_a_line() {
     let folder = tempfile::tempdir().unwrap();
     let (code, said) = run_tab(folder.path(), "", &[FILES[0], "--preferences", "typo.prm"]);
-    assert_eq!(code, Some(6), "{said}");
+    assert_eq!(code, Some(3), "{said}");
     assert!(said.contains("typo.prm: cannot read"), "{said}");
     assert!(!folder.path().join("AP00002L.TAB").exists());
     // The usual ones may be absent.

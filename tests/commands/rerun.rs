@@ -9,7 +9,7 @@ use crate::common;
 
 use std::{collections::BTreeMap, fs::File, time::SystemTime};
 
-use common::case::Case;
+use common::{case::Case, mission::succeed};
 
 /// Stages that would run, with the reason.
 fn plan(case: &Case) -> BTreeMap<String, String> {
@@ -307,10 +307,17 @@ fn until_force_and_plan() {
     let mut command = case.run();
     command.arg("--plan");
     let printed = case.outcome(command);
-    assert!(printed.contains("keep  convert_datum"), "{printed}");
     assert!(
-        printed.contains("run   group_profiles                   no earlier output"),
+        printed.contains("stages would run: no earlier output\n"),
         "{printed}"
+    );
+    let mut command = case.areograph();
+    let listed = succeed(command.args(["-v", "plan", "site.toml", "--out", "out"]));
+    let listed = String::from_utf8(listed.stdout).unwrap();
+    assert!(listed.contains("keep  convert_datum"), "{listed}");
+    assert!(
+        listed.contains("run   group_profiles                   no earlier output"),
+        "{listed}"
     );
     assert!(!case.path("out/case/manifest.json").exists());
     run(&case);

@@ -153,7 +153,7 @@ impl Case {
 
     pub(crate) fn check(&self) -> Command {
         let mut command = self.areograph();
-        command.args(["--quiet", "check", "site.toml"]);
+        command.args(["--quiet", "check", "--full", "site.toml"]);
         command
     }
 

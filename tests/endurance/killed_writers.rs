@@ -116,7 +116,7 @@ fn search(inputs: &Inputs, command: &mut Command, out: &str) {
     command
         .args(["pedr", "search"])
         .arg(inputs.path("ap19020l.b"));
-    command.args(["--box=-170,170,-60,60", "--out", out]);
+    command.args(["--box=-180,180,-60,60", "--out", out]);
 }
 
 /// An empty folder in which a command runs.

@@ -229,7 +229,7 @@ fn answers_of_the_command_are_those_of_a_search() {
     let searched = areograph(&[
         "search",
         archive.to_str().unwrap(),
-        "--box=-170,170,-60,60",
+        "--box=-180,180,-60,60",
         "--out",
         found.to_str().unwrap(),
     ]);

@@ -35,7 +35,7 @@ fn outcome(case: &Case, start: &str, lines: u32, kernels: &str, pointing: &str) 
 /// What `check` says of the case that was run last.
 fn checked(case: &Case) -> String {
     let mut command = case.areograph();
-    command.args(["--quiet", "check", "edge.toml"]);
+    command.args(["--quiet", "check", "--full", "edge.toml"]);
     case.outcome(command)
 }
 

@@ -194,7 +194,7 @@ impl fmt::Display for Unmatched {
                 let pattern = pattern.display();
                 write!(
                     formatter,
-                    "a file, a folder or a glob; {pattern} matches no file"
+                    "a file, a folder or a matching glob; {pattern} matches no file"
                 )
             }
             Self::Other(expected) => formatter.write_str(expected),

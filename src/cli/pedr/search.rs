@@ -15,6 +15,7 @@ use crate::{
     footprints::{AsRead, Footprints},
     pds::archive::{Judged, WindowLists},
     products::ShotsFile,
+    service::words::counted,
 };
 
 /// The file of the shots, if one is requested.
@@ -55,7 +56,10 @@ fn print(statement: &Value, out: Option<&Path>) {
     let is_complete = statement["complete"].as_bool().unwrap_or(false);
     let incomplete = if is_complete { "" } else { "; INCOMPLETE" };
     output::line(format_args!(
-        "{rows} shots in the windows; {files} files searched, {read} records read{incomplete}"
+        "{} in the windows; {} searched, {} read{incomplete}",
+        counted(rows, "shot"),
+        counted(files, "file"),
+        counted(read, "record"),
     ));
     let rejected = statement["rejected"].as_object().into_iter().flatten();
     let rejected: Vec<String> = rejected

@@ -114,7 +114,7 @@ impl fmt::Display for ValueKind {
             Self::File => formatter.write_str("an existing file"),
             Self::Folder => formatter.write_str("an existing folder"),
             Self::Mirror => formatter.write_str("a folder"),
-            Self::Glob => formatter.write_str("a glob that matches a file"),
+            Self::Glob => formatter.write_str("a file, a folder or a matching glob"),
             Self::Number(accept) => accept.fmt(formatter),
             Self::Whole { low, high } => {
                 write!(formatter, "a whole number from {low} to {high}")
