@@ -177,8 +177,10 @@ fn unmatched(pairs: &Pairs, limits: &Limits) -> Vec<String> {
         (&pairs.only_in_a, gone),
         (&pairs.only_in_b, "only in B, not compared"),
     ];
+    let other = (&pairs.no_sites, "products of another flow, not compared");
     let sentences = runs
         .into_iter()
+        .chain([other])
         .flat_map(|(names, what)| names.iter().map(move |name| format!("{name}: {what}")));
     sentences.collect()
 }

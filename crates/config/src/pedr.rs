@@ -20,7 +20,8 @@ declare_table! {
     /// PEDR files. Without this table, images are oriented, but there are no footprints and no range check.
     pub struct PedrConfig: Deserialize {
         /// Paths or globs of PEDR files, with `*`, `?`, `[..]` in at most three parts of the path; `**` is not
-        /// accepted, and letter case is significant. A glob that matches no file is refused. Every shot is counted
+        /// accepted, and letter case is significant; or folders, which stand for all files `*.b` in and below them. A
+        /// path that matches no file is refused. Every shot is counted
         /// once: a copy of a file is read once, and two versions of one orbit are refused.
         #[serde(skip)]
         files: Vec<PathBuf> = key(Globs(&["b"]))

@@ -9,6 +9,10 @@ pub(super) enum DifferenceError {
     #[error("no manifest.json in this folder or below it; expected products of `areograph run`")]
     #[cause(Input: "name the folder given to --out, or a site folder in it")]
     NoProducts,
+    /// Products of another flow.
+    #[error("the products are those of a net, a calibration or a match; expected those of a site")]
+    #[cause("name the products of a site: the comparison is defined for sites only")]
+    NoSite,
     /// Two names of one folder.
     #[error("A and B are the same folder; expected the products of two runs")]
     #[cause("copy the first products elsewhere before the second run, or use a different --out")]

@@ -44,6 +44,9 @@ pub use words::quantity;
 
 use error::DifferenceError;
 
+/// A product of every site, and of no other flow.
+const RANGES: &str = "ranges.json";
+
 /// All differences between two runs of one site.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct RunDifference {
@@ -215,10 +218,7 @@ fn read_movements(
     runs: [(&Path, &Manifest); 2],
 ) -> Result<RunDifference> {
     let [a, b] = runs.map(|(folder, _)| folder);
-    let ranges = [
-        read_ranges(&a.join("ranges.json"))?,
-        read_ranges(&b.join("ranges.json"))?,
-    ];
+    let ranges = [read_ranges(&a.join(RANGES))?, read_ranges(&b.join(RANGES))?];
     let [first, second] = ranges.map(|document| document.profiles);
     difference.profiles = profiles(first, second);
     difference.footprints = footprints::between(a, b)?;
