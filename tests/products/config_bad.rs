@@ -15,7 +15,7 @@ use std::{
 
 use areograph::{
     config::{Document as _, ServiceConfig, SiteConfig},
-    error::Kind,
+    error::{Error, Kind},
 };
 use common::golden::{Golden, assert_messages};
 
@@ -66,6 +66,21 @@ fn every_bad_file_has_its_exact_message() {
     golden.finish();
 }
 
+/// A file that does not exist is missing input wherever it is named; beside another fault it is not the kind of the failure.
+#[test]
+fn files_that_do_not_exist_are_missing_input() {
+    let folder = folder();
+    let kind = |entries: &str| {
+        let text = format!("site = \"s\"\n{entries}\npedr.files = [\"none.b\"]\n");
+        let window = "[[windows]]\nid = \"w\"\nlongitude_deg = [1, 2]\nlatitude_deg = [1, 2]\n";
+        let file = folder.path().join("s.toml");
+        let problems = SiteConfig::parse(&(text + window), &file).unwrap_err();
+        Error::from(problems).kind()
+    };
+    assert_eq!(kind("kernels.metakernel = \"none.tm\""), Kind::Input);
+    assert_eq!(kind("kernels.metakernel = 1"), Kind::Configuration);
+}
+
 #[test]
 fn files_that_are_no_text_are_refused_before_they_are_parsed() {
     let folder = folder();
@@ -90,7 +105,7 @@ fn files_that_are_no_text_are_refused_before_they_are_parsed() {
     .into_iter()
     .unzip();
     assert_eq!(kinds[..2], [Kind::Configuration; 2]);
-    assert_eq!(kinds[3], Kind::Io);
+    assert_eq!(kinds[3], Kind::Input);
     assert_messages("config_no_text", &told);
 }
 

@@ -327,7 +327,7 @@ mod tests {
             "gusev/search_footprints: ap19019k.b: cannot read: entity not found\n  \
              what to do: check the path; relative paths in a configuration file are relative to its folder"
         );
-        assert_eq!(failure.kind().exit_code(), 6);
+        assert_eq!(failure.kind().exit_code(), 3);
     }
 
     #[test]
