@@ -94,13 +94,13 @@ enum Command {
     Run(run::Arguments),
     Check(check::Arguments),
     Plan(plan::Arguments),
-    /// Inspect kernels: load order, gaps in coverage, differences between alternative sets.
+    /// Inspects kernels: load order, gaps in coverage, differences between alternative sets.
     #[command(after_help = "Example: areograph kernels coverage kernels/nav.tm")]
     Kernels(kernels::Arguments),
-    /// Read images of the camera, find them in the mission's index.
+    /// Reads images of the camera, and finds them in the mission's index.
     #[command(after_help = "Example: areograph image info M0100115.imq")]
     Image(image::Arguments),
-    /// Inspect PEDR files.
+    /// Inspects PEDR files, and searches archives of them.
     #[command(after_help = "Example: areograph pedr info ap10001l.b")]
     Pedr(pedr::Arguments),
     Report(report::Arguments),
@@ -111,7 +111,7 @@ enum Command {
     Scene(scene::Arguments),
     Serve(serve::Arguments),
     Nightly(nightly::Arguments),
-    /// Maintain a service: copies of its database, its tokens.
+    /// Maintains a service: copies of its database, its tokens.
     #[command(after_help = "Example: areograph service token list areograph.toml")]
     Service(service::Arguments),
     Completions(completions::Arguments),

@@ -90,5 +90,5 @@ fn the_network_of_a_lunar_pair_is_read() {
     );
     assert_eq!(file.ties[0].id, "lro_pair00002");
     let missing = read_ties(&path.with_file_name("no.pvl")).unwrap_err();
-    assert_eq!(missing.kind().exit_code(), 6);
+    assert_eq!(missing.kind().exit_code(), 3);
 }

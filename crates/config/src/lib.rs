@@ -90,10 +90,10 @@ pub use site::SiteConfig;
 pub use surface::SurfaceConfig;
 pub use ties::{IntersectionConfig, TiesConfig};
 pub use unknowns::{PositionUnknowns, RotationUnknowns};
-pub use window_list::{
-    load_windows, require_outlines, suspicious_width_deg, window_of_box, window_of_polygon,
+pub use window_list::{load_windows, require_outlines, window_of_box, window_of_polygon};
+pub use windows::{
+    BoxCoordinates, LatitudeKind, LongitudeSense, WindowConfig, suspicious_width_deg,
 };
-pub use windows::{BoxCoordinates, LatitudeKind, LongitudeSense, WindowConfig};
 
 use areograph_base::error::{Cause, Error};
 use declare::described;

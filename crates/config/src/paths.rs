@@ -11,7 +11,7 @@ use toml::Value;
 
 use super::{
     declare::{Form, Found, ValueKind},
-    problems::Review,
+    problems::{Review, shortened},
 };
 
 /// Footprint columns count files in 16 bits.
@@ -207,6 +207,7 @@ pub(super) fn below(folder: &Path, glob: &str) -> String {
     if Path::new(glob).is_absolute() {
         return glob.to_owned();
     }
+    let (folder, glob) = shortened(folder, Path::new(glob));
     let folder = glob::Pattern::escape(&folder.to_string_lossy());
     Path::new(&folder).join(glob).to_string_lossy().into_owned()
 }
@@ -232,8 +233,8 @@ fn matches(folder: &Path, glob: &str, endings: &[&str]) -> Result<Vec<PathBuf>, 
     let written = below(folder, glob);
     let is_folder = folder.join(glob).is_dir();
     let pattern = if is_folder {
-        let folder = folder.join(glob);
-        below(&folder, "**/*")
+        let (folder, glob) = shortened(folder, Path::new(glob));
+        below(&folder.join(glob), "**/*")
     } else {
         written.clone()
     };

@@ -182,9 +182,9 @@ impl<'a> Review<'a> {
 
     /// `path` as written in the file, relative to the file's folder unless absolute.
     pub(super) fn resolve(&self, path: &str) -> PathBuf {
-        self.file
-            .parent()
-            .map_or_else(|| PathBuf::from(path), |folder| folder.join(path))
+        let folder = self.file.parent().unwrap_or(Path::new(""));
+        let (folder, path) = shortened(folder, Path::new(path));
+        folder.join(path)
     }
 
     /// A problem with a separate text.
@@ -295,6 +295,22 @@ impl<'a> Review<'a> {
     }
 }
 
+/// A folder and a path from there, without steps into the folder and back: messages state short paths. A folder that is
+/// a link stays, since its parent is not the one of its name.
+pub(super) fn shortened<'a>(folder: &Path, path: &'a Path) -> (PathBuf, &'a Path) {
+    let (mut folder, mut path) = (folder.to_owned(), path);
+    while let Ok(rest) = path.strip_prefix("..") {
+        let is_real = folder.file_name().is_some()
+            && folder.symlink_metadata().is_ok_and(|found| found.is_dir());
+        if !is_real || rest.as_os_str().is_empty() {
+            break;
+        }
+        folder.pop();
+        path = rest;
+    }
+    (folder, path)
+}
+
 /// Line and column of a byte, both counted from 1, the column in characters.
 fn line_and_column(text: &str, offset: usize) -> (usize, usize) {
     let before = &text[..text.floor_char_boundary(offset)];
@@ -306,6 +322,22 @@ fn line_and_column(text: &str, offset: usize) -> (usize, usize) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn paths_lead_back_without_a_step_into_the_folder() {
+        let folder = tempfile::tempdir().unwrap();
+        let (real, link) = (folder.path().join("a/b"), folder.path().join("a/link"));
+        std::fs::create_dir_all(&real).unwrap();
+        std::os::unix::fs::symlink(folder.path(), &link).unwrap();
+        let seen = |from: &Path, path: &str| {
+            let (folder, path) = shortened(from, Path::new(path));
+            folder.join(path)
+        };
+        assert_eq!(seen(&real, "../../x.tm"), folder.path().join("x.tm"));
+        assert_eq!(seen(&link, "../x.tm"), link.join("../x.tm"));
+        assert_eq!(seen(&real, ".."), real.join(".."));
+        assert_eq!(seen(Path::new(""), "../x.tm"), Path::new("../x.tm"));
+    }
 
     #[test]
     fn problems_come_in_order_of_place_and_long_lists_are_cut() {

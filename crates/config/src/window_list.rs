@@ -123,14 +123,6 @@ pub fn window_of_box(id: &str, edges_deg: [f64; 4]) -> Result<WindowConfig, Erro
     })
 }
 
-/// The width of a box that covers more than half of all longitudes, but not all: its edges may have been exchanged.
-/// Degrees.
-#[must_use]
-pub fn suspicious_width_deg([west_deg, east_deg]: [f64; 2]) -> Option<f64> {
-    let width_deg = (east_deg - west_deg).rem_euclid(360.0);
-    (width_deg > 180.0).then_some(width_deg)
-}
-
 /// The window of the polygons in a GeoJSON file; its identifier is the file's name.
 ///
 /// # Errors

@@ -63,11 +63,15 @@ impl Answers {
             &arguments.pedr,
             &|paths| of_kind(paths, &files::PEDR_FILES),
         )?;
-        let shots = paths(
-            "Shot tables from the Orbital Data Explorer [none]",
-            &arguments.shots,
-            &|paths| of_kind(paths, &files::SHOT_TABLES),
-        )?;
+        let shots = if pedr.is_empty() {
+            paths(
+                "Shot tables from the Orbital Data Explorer [none]",
+                &arguments.shots,
+                &|paths| of_kind(paths, &files::SHOT_TABLES),
+            )?
+        } else {
+            Vec::new()
+        };
         let labels = paths("Image labels [none]", &arguments.labels, &|paths| {
             images(paths).map(drop)
         })?;
