@@ -520,6 +520,7 @@ fn orientation(times: &ImageTimes) -> Orientation {
                 samples: 0.01,
             }],
         },
+        centre: None,
         notes: Vec::new(),
         invalid_because: Vec::new(),
     }

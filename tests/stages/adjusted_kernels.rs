@@ -15,15 +15,12 @@ use areograph::{
     frames::Rotation,
     geom::{attitude::matrix_of_rotation_vector, light_time::LightTime},
     line_times::LineTimes,
-    products::{
-        AdjustedImage, AdjustedKernels, Product, attitude_kernel, position_kernel,
-        write_adjusted_kernels,
-    },
+    products::{AdjustedImage, AdjustedKernels, KernelReaders, Product, write_adjusted_kernels},
     spice::{KernelRole, KernelSet, Session},
     stages::{
         reorient::{LineCorrection, reorient},
         sample_orientation::Orientation,
-        tabulate_kernels::{KernelTables, require_same, tabulate_kernels},
+        tabulate_kernels::{AdjustedTables, require_same, tabulate_kernels},
         tag_times::ImageTimes,
     },
     time::{Et, PointingBias},
@@ -69,14 +66,22 @@ fn written(of: &Image, to: &AdjustedKernels, images: &[Adjusted]) -> Result<Vec<
     let session = Session::open(to.originals)?;
     let tabulate = |(index, image): (usize, &Adjusted)| {
         let (kernels, pointing) = (&of.kernels, to.pointing);
-        tabulate_kernels(
-            &session,
-            &times,
-            index,
-            image.orientation,
-            kernels,
-            pointing,
-        )
+        let tabulate = |readers| {
+            let orientation = image.orientation;
+            tabulate_kernels(
+                &session,
+                &times,
+                index,
+                orientation,
+                readers,
+                kernels,
+                pointing,
+            )
+        };
+        Ok(AdjustedTables {
+            own: tabulate(of.light_time)?,
+            centre: tabulate(LightTime::Centre)?,
+        })
     };
     let tables = images.iter().enumerate().map(tabulate);
     let tables = tables.collect::<Result<Vec<_>>>()?;
@@ -92,11 +97,16 @@ fn written(of: &Image, to: &AdjustedKernels, images: &[Adjusted]) -> Result<Vec<
     let products = write_adjusted_kernels(to, &adjusted)?;
     for image in images {
         let id = &image.times.id;
-        let own = [position_kernel(id), attitude_kernel(id)].map(|name| to.directory.join(name));
-        let session = Session::open(&to.originals.followed_by(&own)?)?;
-        let (kernels, pointing) = (&of.kernels, to.pointing);
-        require_same(&session, image.times, image.orientation, kernels, pointing)
-            .in_file(position_kernel(id))?;
+        for readers in KernelReaders::ALL {
+            let [position, attitude] = readers.paths(id);
+            let own = [&position, &attitude].map(|name| to.directory.join(name));
+            let session = Session::open(&to.originals.followed_by(&own)?)?;
+            let (kernels, pointing) = (&of.kernels, to.pointing);
+            let convention = readers.convention(of.light_time);
+            let (times, orientation) = (image.times, image.orientation);
+            require_same(&session, times, orientation, convention, kernels, pointing)
+                .in_file(position)?;
+        }
     }
     Ok(products)
 }
@@ -163,9 +173,14 @@ fn sampling_with_the_adjusted_kernels_gives_the_adjusted_orientation() {
                 .iter()
                 .map(|product| product.path.display().to_string())
                 .collect();
-            let pair = [format!("adjusted/{id}.bc"), format!("adjusted/{id}.bsp")];
-            assert_eq!(paths[..2], pair);
-            assert_eq!(paths[2..], ["adjusted.tm"]);
+            let pairs = [
+                format!("adjusted/{id}.bsp"),
+                format!("adjusted/{id}.bc"),
+                format!("exchange/centre/{id}_adjusted.bsp"),
+                format!("exchange/centre/{id}_adjusted.bc"),
+            ];
+            assert_eq!(paths[..4], pairs);
+            assert_eq!(paths[4..], ["adjusted.tm"]);
             let set = KernelSet::from_metakernel(&folder.path().join("adjusted.tm")).unwrap();
             let again = image.sampled_with(&set);
             let (distance_m, turn_rad) = apart(&again, &adjusted);
@@ -223,7 +238,10 @@ fn the_metakernel_lists_the_adjusted_kernels_last_and_the_comments_say_the_rule(
     for name in ["adjusted/E02-02016.bsp", "adjusted/E02-02016.bc"] {
         let comment = comment(name);
         assert!(comment.contains("is stored at t - 1.150 s"), "{name}");
-        assert!(comment.contains("load the file as it is"), "{name}");
+        assert!(
+            comment.contains("ISIS and ALE apply this offset, too"),
+            "{name}"
+        );
     }
     // Outside the image with its padding the original kernels rule, as before.
     let after = image
@@ -373,13 +391,7 @@ fn orientations_that_are_none_and_kernels_that_end_are_refused() {
             .to_string()
             .contains("0 orientation samples")
     );
-    let tables = KernelTables {
-        epochs: Vec::new(),
-        states: Vec::new(),
-        ticks: Vec::new(),
-        quaternions: Vec::new(),
-        rates_rad_s: Vec::new(),
-    };
+    let tables = AdjustedTables::default();
     let nothing = AdjustedImage {
         times: &image.times,
         tables: &tables,
