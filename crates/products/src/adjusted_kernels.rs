@@ -101,11 +101,6 @@ impl KernelReaders {
     }
 }
 
-const ATTITUDE_WHAT: &str =
-    "adjusted attitude of the bus around the time of the image, J2000 (CK type 3)";
-const POSITION_WHAT: &str = "adjusted geometric position of the spacecraft relative to {body} around the time of the image, \
-                             J2000 (SPK type 13)";
-
 /// A kernel of a pair.
 const fn kernel(
     path: &'static str,
@@ -130,11 +125,22 @@ const RUN: &str = "areograph, SPICE (not ISIS, ALE)";
 /// Readers of the pair with light time to the centre.
 const CENTRE: &str = "ISIS, ALE";
 
-pub(super) static ATTITUDE: Declaration = kernel("adjusted/<image>.bc", ATTITUDE_WHAT, RUN, &[]);
-pub(super) static POSITION: Declaration = kernel("adjusted/<image>.bsp", POSITION_WHAT, RUN, &[]);
+pub(super) static ATTITUDE: Declaration = kernel(
+    "adjusted/<image>.bc",
+    "adjusted attitude of the bus around the time of the image, J2000 (CK type 3)",
+    RUN,
+    &[],
+);
+pub(super) static POSITION: Declaration = kernel(
+    "adjusted/<image>.bsp",
+    "geometric positions of the spacecraft relative to {body} around the time of the image, from which the light-time \
+     convention of the run gives the adjusted camera, J2000 (SPK type 13)",
+    RUN,
+    &[],
+);
 pub(super) static CENTRE_ATTITUDE: Declaration = kernel(
     "exchange/centre/<image>_adjusted.bc",
-    ATTITUDE_WHAT,
+    "adjusted attitude of the bus around the time of the image, J2000 (CK type 3), for ISIS and ALE",
     CENTRE,
     &[Use {
         program: Program::AdjustedKernels,
@@ -143,7 +149,8 @@ pub(super) static CENTRE_ATTITUDE: Declaration = kernel(
 );
 pub(super) static CENTRE_POSITION: Declaration = kernel(
     "exchange/centre/<image>_adjusted.bsp",
-    POSITION_WHAT,
+    "geometric positions of the spacecraft relative to {body} around the time of the image, from which light time to the \
+     centre of {body}, as in ISIS and ALE, gives the adjusted camera, J2000 (SPK type 13)",
     CENTRE,
     &[],
 );

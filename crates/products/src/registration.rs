@@ -26,7 +26,7 @@ const DEFINITIONS: [(&str, &str); 7] = [
     (
         "line, sample",
         "0 at the start of the first line and the outer edge of the first pixel, 0.5 at their centres; \
-        lines of the header image, with the light-time convention of the run. isis_line and isis_sample are those of ISIS",
+        lines of the header image, by the light-time convention of the run",
     ),
     (
         "points",
@@ -59,13 +59,11 @@ const DEFINITIONS: [(&str, &str); 7] = [
 ];
 
 /// Meaning of a line of ISIS.
-pub(super) const ISIS_LINE: &str = "line in ISIS (qview, campt): 1 at the centre of the first line of the delivered image file, with the light-time \
-     convention of ISIS and ALE whatever the convention of the run; with the orientation from the kernels, the line after \
-     spiceinit; with the adjusted orientation, the line with the adjusted kernels of exchange/centre; missing where the \
-     file does not show the footprint to ISIS";
+pub(super) const ISIS_LINE: &str = "line in ISIS (qview, campt), 1 at the centre of the first line of the image file: before the adjustment with the \
+     original kernels, after it with those of exchange/centre; missing outside the file";
 /// Meaning of a sample of ISIS.
 pub(super) const ISIS_SAMPLE: &str =
-    "sample in ISIS, 1 at the centre of the first pixel, under the conditions of the line in ISIS";
+    "sample in ISIS, 1 at the centre of the first pixel, with the same kernels as the line in ISIS";
 
 /// A line or sample of ISIS, if there is one.
 pub(super) fn isis(place: f64) -> Option<f64> {

@@ -2,7 +2,7 @@
 
 use crate::orientation::CameraReader;
 use crate::{
-    orientation::{CameraTables, InterpolationCheck, RayOrigin, angular_velocity},
+    orientation::{CameraTables, InterpolationCheck, RayOrigin},
     tag_times::ImageTimes,
 };
 use areograph_base::{body::Body, error::Result, time::Et};
@@ -98,7 +98,7 @@ fn tables(reader: &CameraReader<'_>, epochs: &[Et]) -> Result<CameraTables> {
         tables.inertial_to_mars.push(to_mars);
         tables
             .mars_angular_velocity_rad_s
-            .push(angular_velocity(Body::Mars, to_mars.matrix()));
+            .push(CameraTables::spin_rad_s(Body::Mars, to_mars.matrix()));
     }
     Ok(tables)
 }

@@ -26,7 +26,7 @@ use std::borrow::Cow;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::{CameraReader, CameraTables, InterpolationCheck, LightTimeEffect, Orientation, tables};
+use super::{CameraReader, CameraTables, InterpolationCheck, LightTimeEffect, Orientation};
 use crate::tag_times::ImageTimes;
 use areograph_base::{
     error::Result,
@@ -94,7 +94,7 @@ impl SeenFromCentre {
         let inertial_to_mars: Vec<Rotation<J2000, BodyFixed>> =
             epochs.map(|et| body_rotation(image.body, et)).collect();
         let spins = inertial_to_mars.iter();
-        let spins = spins.map(|to_mars| tables::angular_velocity(image.body, to_mars.matrix()));
+        let spins = spins.map(|to_mars| CameraTables::spin_rad_s(image.body, to_mars.matrix()));
         CameraTables {
             position_m: self.position_m.clone(),
             velocity_m_s: self.velocity_m_s.clone(),

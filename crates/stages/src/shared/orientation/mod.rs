@@ -13,7 +13,7 @@ pub use centre::SeenFromCentre;
 pub(crate) use light_time::RayOrigin;
 pub use light_time::{LightTimeEffect, OtherConvention};
 pub(crate) use reader::CameraReader;
-pub(crate) use tables::{Camera, Nodes, angular_velocity};
+pub(crate) use tables::{Camera, Nodes};
 pub use tables::{CameraTables, InterpolationCheck};
 
 use crate::tag_times::ImageTimes;

@@ -59,6 +59,11 @@ pub struct InterpolationCheck {
 }
 
 impl CameraTables {
+    /// Spin of a body in J2000: its rate along its pole (the pole's own motion is 1e-14 rad/s).
+    pub(crate) fn spin_rad_s(body: Body, inertial_to_body: &Matrix3<f64>) -> Vector3<f64> {
+        inertial_to_body.tr_mul(&spin_rad_s(body.model()))
+    }
+
     /// The tables without their nodes, which occupy most of the memory of an image.
     #[must_use]
     pub fn without_nodes(&self) -> Self {
@@ -106,11 +111,6 @@ impl InterpolationCheck {
         }
         Ok(check)
     }
-}
-
-/// Spin of a body in J2000: its rate along its pole (the pole's own motion is 1e-14 rad/s).
-pub(crate) fn angular_velocity(body: Body, inertial_to_body: &Matrix3<f64>) -> Vector3<f64> {
-    inertial_to_body.tr_mul(&spin_rad_s(body.model()))
 }
 
 /// Position and rotation of the camera at one instant.
