@@ -27,7 +27,15 @@ pub(super) fn read_back(
         if times.support.is_some() {
             continue;
         }
+        let reasons = [
+            &orientation.invalid_because,
+            &image.model.value()?.invalid_because,
+        ];
+        let is_valid = reasons.iter().all(|reasons| reasons.is_empty());
         for readers in KernelReaders::ALL {
+            if !readers.have(is_valid) {
+                continue;
+            }
             let own = readers.paths(&times.id);
             let session = kernels.followed_by(&own.clone().map(|name| staging.join(name)))?;
             let same = require_same(

@@ -552,6 +552,7 @@ fn adjusted_kernels_are_of_the_spacecraft_of_the_image() {
         times: &times,
         tables: &tables,
         light_time: LightTime::Centre,
+        is_valid: true,
     };
     write_adjusted_kernels(&to, &[image]).unwrap();
     let own = KernelReaders::Run.paths(&times.id);

@@ -10,7 +10,7 @@ use std::{
 use super::{
     files::write_text,
     product::{Content, Context, Declaration, Product, Program, Role, Use, Write, Written},
-    site::AdjustmentProducts,
+    site::{AdjustmentProducts, SiteProducts},
 };
 use areograph_base::{
     constants::NAIF_MARS,
@@ -41,6 +41,8 @@ pub struct AdjustedImage<'a> {
     pub tables: &'a AdjustedTables,
     /// The convention of the run.
     pub light_time: LightTime,
+    /// Whether its orientation is valid.
+    pub is_valid: bool,
 }
 
 /// Destination of the kernels, and the kernels that they replace.
@@ -93,6 +95,13 @@ impl KernelReaders {
         }
     }
 
+    /// Whether they have a pair of an image whose orientation is valid or not. With an attitude that jumps, so does the light
+    /// time along the boresight, which only states for readers with the same convention can follow.
+    #[must_use]
+    pub const fn have(self, is_valid: bool) -> bool {
+        matches!(self, Self::Run) || is_valid
+    }
+
     const fn tables(self, of: &AdjustedTables) -> &KernelTables {
         match self {
             Self::Run => &of.own,
@@ -140,7 +149,8 @@ pub(super) static POSITION: Declaration = kernel(
 );
 pub(super) static CENTRE_ATTITUDE: Declaration = kernel(
     "exchange/centre/<image>_adjusted.bc",
-    "adjusted attitude of the bus around the time of the image, J2000 (CK type 3), for ISIS and ALE",
+    "adjusted attitude of the bus around the time of the image, J2000 (CK type 3), for ISIS and ALE; for images with a valid \
+     orientation",
     CENTRE,
     &[Use {
         program: Program::AdjustedKernels,
@@ -150,7 +160,7 @@ pub(super) static CENTRE_ATTITUDE: Declaration = kernel(
 pub(super) static CENTRE_POSITION: Declaration = kernel(
     "exchange/centre/<image>_adjusted.bsp",
     "geometric positions of the spacecraft relative to {body} around the time of the image, from which light time to the \
-     centre of {body}, as in ISIS and ALE, gives the adjusted camera, J2000 (SPK type 13)",
+     centre of {body}, as in ISIS and ALE, gives the adjusted camera, J2000 (SPK type 13); for images with a valid orientation",
     CENTRE,
     &[],
 );
@@ -166,6 +176,17 @@ pub(super) static METAKERNEL: Declaration = Declaration {
     uses: &[],
 };
 
+/// Whether the image with this index has this kernel. Images with support data get none.
+pub(super) fn has(site: &SiteProducts, kernel: &Declaration, index: usize) -> bool {
+    let adjusted = site.adjustment().map(|(_, adjustment)| adjustment.images);
+    adjusted.is_some_and(|images| {
+        let is_valid = images[index].invalid_because().is_empty();
+        let mut readers = KernelReaders::ALL.into_iter();
+        let readers = readers.find(|of| of.declarations().iter().any(|of| of.path == kernel.path));
+        images[index].times.support.is_none() && readers.is_some_and(|of| of.have(is_valid))
+    })
+}
+
 /// The adjusted kernels of a site.
 fn of_site(of: &Context, adjustment: &AdjustmentProducts) -> Result<Vec<Written>> {
     let to = AdjustedKernels {
@@ -180,6 +201,7 @@ fn of_site(of: &Context, adjustment: &AdjustmentProducts) -> Result<Vec<Written>
         times: image.times,
         tables,
         light_time: image.orientation.light_time.convention,
+        is_valid: image.invalid_because().is_empty(),
     });
     written(&to, &images.collect::<Vec<_>>())
 }
@@ -209,7 +231,7 @@ fn written(to: &AdjustedKernels, images: &[AdjustedImage]) -> Result<Vec<Written
     };
     for readers in KernelReaders::ALL {
         for declaration in readers.declarations() {
-            for image in images {
+            for image in images.iter().filter(|image| readers.have(image.is_valid)) {
                 let name = declaration.path_of(&image.times.id);
                 let path = to.directory.join(&name);
                 if let Some(folder) = path.parent() {
