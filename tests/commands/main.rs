@@ -8,6 +8,7 @@ mod compare_kernels;
 mod compare_readings;
 mod contradictions;
 mod contradictions_attitude;
+mod corrections_over_isis;
 mod crossover_choice;
 mod damaged_kernels;
 mod example_kernels;
