@@ -2,6 +2,7 @@
 
 mod advice;
 mod bad_input;
+mod camera_without_sight;
 #[path = "../common/mod.rs"]
 mod common;
 mod compare_kernels;

@@ -127,6 +127,18 @@ def test_other_files_are_refused(image: Any, kind: type[Exception], text: str) -
         ag.ground_to_image(image, 1.0, 2.0, 3.4e6)
 
 
+def test_a_camera_that_sees_no_ground_is_refused(mission: Mission) -> None:
+    isd = mission.gusev.isd(IMAGE)
+    # A spacecraft that stands still over a body that does not turn: no line sees a point.
+    still = json.loads(json.dumps(isd))
+    for block, key in (("instrument_position", "positions"), ("body_rotation", "quaternions")):
+        still[block][key] = [still[block][key][0]] * len(still[block][key])
+    for block, key in (("instrument_position", "velocities"), ("body_rotation", "angular_velocities")):
+        still[block][key] = [[0.0] * 3] * len(still[block][key])
+    with pytest.raises(ag.InputError, match="shows the ground"):
+        ag.ground_to_image(still, 175.0, -15.0, 3.4e6)
+
+
 def test_damaged_support_data_are_refused(mission: Mission, tmp_path: Path) -> None:
     isd = mission.gusev.isd(IMAGE)
     for change in ({"image_lines": 0}, {"radii": {}}, {"instrument_position": None}):
