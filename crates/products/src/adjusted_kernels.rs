@@ -142,15 +142,14 @@ pub(super) static ATTITUDE: Declaration = kernel(
 );
 pub(super) static POSITION: Declaration = kernel(
     "adjusted/<image>.bsp",
-    "geometric positions of the spacecraft relative to {body} around the time of the image, from which the light-time \
-     convention of the run gives the adjusted camera, J2000 (SPK type 13)",
+    "positions of the spacecraft relative to {body}, from which the light-time convention of the run gives the adjusted \
+     camera of the image, J2000 (SPK type 13)",
     RUN,
     &[],
 );
 pub(super) static CENTRE_ATTITUDE: Declaration = kernel(
     "exchange/centre/<image>_adjusted.bc",
-    "adjusted attitude of the bus around the time of the image, J2000 (CK type 3), for ISIS and ALE; for images with a valid \
-     orientation",
+    "attitude of the bus from which ISIS and ALE compute the adjusted camera of a valid image, J2000 (CK type 3)",
     CENTRE,
     &[Use {
         program: Program::AdjustedKernels,
@@ -159,8 +158,8 @@ pub(super) static CENTRE_ATTITUDE: Declaration = kernel(
 );
 pub(super) static CENTRE_POSITION: Declaration = kernel(
     "exchange/centre/<image>_adjusted.bsp",
-    "geometric positions of the spacecraft relative to {body} around the time of the image, from which light time to the \
-     centre of {body}, as in ISIS and ALE, gives the adjusted camera, J2000 (SPK type 13); for images with a valid orientation",
+    "positions of the spacecraft relative to {body}, from which ISIS and ALE compute the adjusted camera of a valid image, \
+     J2000 (SPK type 13)",
     CENTRE,
     &[],
 );

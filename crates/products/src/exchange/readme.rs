@@ -88,19 +88,26 @@ fn light_time(site: &SiteProducts) -> String {
         return format!("{}.\n\n", convention(site));
     }
     let body = site.config.terms().body();
-    format!(
+    let mut text = format!(
         "Files in the folder centre/ have the light-time convention of ISIS and ALE in every run: positions as seen from the\n\
-         centre of {body} (LT+S). All other files have the convention of this run,\n{}.\n\
-         Before an adjustment, the camera models of the two conventions see the ground about 10 lines apart:\n\
-         ../registration.json states the differences for each image, and the columns isis_line and isis_sample of\n\
-         ../registration.parquet are places in ISIS. The adjusted rays are the same in both conventions. Therefore adjusted\n\
-         points, networks, ground control, residuals and ../images/<image>/adjusted_isd.json suit every program, and only\n\
-         the adjusted kernels depend on the program that reads them. Ranges of lidar data are geometric: with the adjusted\n\
-         kernels in centre/, the ranges that jigsaw computes agree to 0.2 m; with the original kernels they differ by up to\n\
-         330 m.\n\n",
+         centre of {body} (LT+S). Other camera models, lines and samples, and kernels have the convention of this run,\n\
+         {}.\n\
+         With the orientation from the kernels, the two conventions see the ground about 10 lines apart. ../registration.json\n\
+         states the differences for each image; isis_line and isis_sample of ../registration.parquet are places in ISIS.\n\n",
         convention(site)
-    )
+    );
+    if site.adjustment().is_some() {
+        text += ADJUSTED;
+    }
+    text
 }
+
+/// Conventions after an adjustment.
+const ADJUSTED: &str = "\
+    Adjusted rays are the same in both conventions: points, networks, ground control, residuals and\n\
+    ../images/<image>/adjusted_isd.json suit every program, and only the adjusted kernels depend on the program that reads\n\
+    them. Ranges of lidar data are geometric: with the adjusted kernels in centre/, the ranges that jigsaw computes agree to\n\
+    0.2 m; with the original kernels they differ by up to 330 m.\n\n";
 
 /// Files written and not empty, each file of images once, and files to be written: those declared after this text.
 fn files(of: &Context) -> Vec<&'static Declaration> {

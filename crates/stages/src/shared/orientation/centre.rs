@@ -26,7 +26,9 @@ use std::borrow::Cow;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::{CameraReader, CameraTables, InterpolationCheck, LightTimeEffect, Orientation};
+use super::{
+    CameraReader, CameraTables, InterpolationCheck, LightTimeEffect, Orientation, RayOrigin,
+};
 use crate::tag_times::ImageTimes;
 use areograph_base::{
     error::Result,
@@ -72,8 +74,11 @@ impl SeenFromCentre {
         light_time: LightTimeEffect,
     ) -> Result<Self> {
         let (mut position_m, mut velocity_m_s) = (Vec::new(), Vec::new());
+        // The direction of a look does not matter to this convention.
+        let look = Vector3::z();
         for et_s in &tables.et_s {
-            let state = reader.session.apparent_state(Et::from_seconds(*et_s))?;
+            let et = Et::from_seconds(*et_s);
+            let state = RayOrigin::at(reader.session, reader.light_time, et, &look)?.state;
             position_m.push(state.position.xyz_m);
             velocity_m_s.push(state.velocity_m_s);
         }
