@@ -192,10 +192,10 @@ pub fn register<'a>(
             .map(|(_, row)| {
                 let projector = projector.as_ref().map_err(|unseen| *unseen)?;
                 let point_m = ground_m(footprints, *row);
+                let point = camera.place(projector, &point_m)?;
                 let place = isis_projector.as_ref();
                 let [isis_line, isis_sample] =
                     place.map_or(isis::UNSEEN, |projector| isis.place(projector, &point_m));
-                let point = camera.place(projector, &point_m)?;
                 Ok::<_, FootprintRejection>(PointOnImage {
                     isis_line,
                     isis_sample,
@@ -264,8 +264,8 @@ impl OrientedImage<'_> {
             line_offset: solution.x,
             y_px: focal_px.y,
             range_m: solution.camera_m.norm(),
-            isis_line: 0.0,
-            isis_sample: 0.0,
+            isis_line: isis::UNSEEN[0],
+            isis_sample: isis::UNSEEN[1],
             residual_px: self.detector.missed_px(&focal_px),
             step_lines: solution.step_lines,
             evaluations: solution.evaluations,
