@@ -10,7 +10,7 @@ use crate::{
     error::{Cause, Locate, Result},
     files::{overlap, real_path, require_own},
     kernel_source::{KernelList, KernelSource},
-    products::position_kernel,
+    products::KernelReaders,
     report::FIDELITY_FILE,
     spice::PATH_LENGTH_MAX,
     store::{
@@ -88,7 +88,8 @@ pub fn check_out(out: &Path, sites: &[SiteConfig]) -> Result<()> {
     for site in sites.iter().filter(|site| site.ties.are_there()) {
         let staging = staging_path(&out.join(&site.site));
         let ids = site.images.iter().map(|image| &*image.id);
-        let products = ids.map(|id| staging.join(position_kernel(id)));
+        let kernels = ids.flat_map(|id| KernelReaders::ALL.map(|readers| readers.paths(id)));
+        let products = kernels.flatten().map(|path| staging.join(path));
         let longest = products.max_by_key(|product| product.as_os_str().len());
         if let Some(product) = longest.filter(|path| path.as_os_str().len() > PATH_LENGTH_MAX) {
             return Err(OutError::LongPath { product }).in_site(&site.site);

@@ -6,13 +6,13 @@ use super::outputs::Site;
 use crate::{
     config::SiteConfig,
     error::{Locate, Result},
-    products::{attitude_kernel, position_kernel},
+    products::KernelReaders,
     spice::{KernelSet, Session},
     stage::Round,
     stages::{site_image::SiteImage, tabulate_kernels::require_same},
 };
 
-/// Samples every adjusted image through the original kernels and its own pair in `staging`.
+/// Samples every adjusted image through the original kernels and each of its own pairs in `staging`.
 ///
 /// # Errors
 /// [`Kind::Bug`](crate::error::Kind::Bug) for orientations that differ when read back.
@@ -27,17 +27,28 @@ pub(super) fn read_back(
         if times.support.is_some() {
             continue;
         }
-        let position = position_kernel(&times.id);
-        let own = [&position, &attitude_kernel(&times.id)].map(|name| staging.join(name));
-        let session = Session::open(&kernels.followed_by(&own)?)?;
-        let same = require_same(
-            &session,
-            times,
-            orientation,
-            &config.kernels,
-            &config.pointing,
-        );
-        same.in_file(position)?;
+        let reasons = [
+            &orientation.invalid_because,
+            &image.model.value()?.invalid_because,
+        ];
+        let is_valid = reasons.iter().all(|reasons| reasons.is_empty());
+        for readers in KernelReaders::ALL {
+            if !readers.have(is_valid) {
+                continue;
+            }
+            let own = readers.paths(&times.id);
+            let session = kernels.followed_by(&own.clone().map(|name| staging.join(name)))?;
+            let same = require_same(
+                &Session::open(&session)?,
+                times,
+                orientation,
+                readers.convention(orientation.light_time.convention),
+                &config.kernels,
+                &config.pointing,
+            );
+            let [position, _] = own;
+            same.in_file(position)?;
+        }
     }
     Ok(())
 }

@@ -25,7 +25,7 @@ use crate::{
         read_ties::{ImageNames, ReadTies, TieFiles, Ties},
         reorient::Reorient,
         site_image::{SiteImage, SiteImages},
-        tabulate_kernels::{KernelTables, TabulateKernels},
+        tabulate_kernels::{AdjustedTables, TabulateKernels},
         tag_times::ImageTimes,
     },
     store::book::Book,
@@ -39,7 +39,7 @@ struct Adjustment {
     /// The images with their adjusted orientation.
     images: Vec<SiteImage>,
     /// Contents of the adjusted kernels of every image.
-    tables: Vec<Output<KernelTables>>,
+    tables: Vec<Output<AdjustedTables>>,
     /// With the adjusted orientation.
     intersection: Intersection,
 }

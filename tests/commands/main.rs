@@ -2,12 +2,14 @@
 
 mod advice;
 mod bad_input;
+mod camera_without_sight;
 #[path = "../common/mod.rs"]
 mod common;
 mod compare_kernels;
 mod compare_readings;
 mod contradictions;
 mod contradictions_attitude;
+mod corrections_over_isis;
 mod crossover_choice;
 mod damaged_kernels;
 mod example_kernels;

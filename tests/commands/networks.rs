@@ -26,13 +26,8 @@ fn adjusted_with(name: &str) -> BTreeMap<PathBuf, Vec<u8>> {
     let states_file = |path: &PathBuf| {
         let name = path.file_name().unwrap().to_string_lossy();
         path.starts_with("report")
-            || [
-                "manifest.json",
-                "stac_item.json",
-                "isd.json",
-                "adjusted_isd.json",
-            ]
-            .contains(&&*name)
+            || ["manifest.json", "stac_item.json"].contains(&&*name)
+            || name.ends_with("isd.json")
     };
     products.retain(|path, _| !states_file(path));
     products

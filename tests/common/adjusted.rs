@@ -133,13 +133,23 @@ pub(crate) fn kernel_camera(
     image: &Image,
     et: Et,
 ) -> (Vector3<f64>, Matrix3<f64>) {
+    kernel_camera_by(session, image, image.light_time, et)
+}
+
+/// The same by another convention.
+pub(crate) fn kernel_camera_by(
+    session: &Session,
+    image: &Image,
+    light_time: LightTime,
+    et: Et,
+) -> (Vector3<f64>, Matrix3<f64>) {
     let to_mars = body_matrix(&MARS_IAU2000, et);
     let lookup = image.pointing.bias_of(usual_instrument()).lookup(et);
     let attitude = session.attitude(lookup, et, 0.0).unwrap();
     let to_camera = session.mounting(usual_instrument(), et).unwrap() * attitude.inertial_to_bus;
     let to_inertial = to_camera.matrix().transpose();
     let geometric_m = session.state(et).unwrap().position.xyz_m;
-    match image.light_time {
+    match light_time {
         LightTime::Support => unreachable!("kernels have no support data"),
         LightTime::None => (to_mars * geometric_m, to_mars * to_inertial),
         LightTime::Centre => {

@@ -14,7 +14,7 @@ use areograph::{
     footprints::{Footprint, Footprints, SourceFile},
     frames::{BodyFixed, Frame, Position, Rotation},
     geom::{
-        attitude::{OmegaPhiKappa, matrix_of_spice_quaternion},
+        attitude::{OmegaPhiKappa, matrix_of_rotation_vector, matrix_of_spice_quaternion},
         ellipsoid::Spherical,
         light_time::LightTime,
         pushbroom::ExteriorOrientation,
@@ -501,7 +501,7 @@ fn orientation(times: &ImageTimes) -> Orientation {
             inertial_to_mars: turned(&et_s, [0.95, -0.2, -0.2, 0.0]),
             mars_angular_velocity_rad_s: vec![Vector3::new(3e-5, -3e-5, 6e-5); nodes],
             bus_to_camera: Rotation::new(
-                Matrix3::new(1.0, 0.003, 0.001, -0.003, 1.0, 0.002, -0.001, -0.002, 1.0),
+                matrix_of_rotation_vector(&Vector3::new(-0.002, 0.001, -0.003)),
                 Et::from_seconds(START_S),
             ),
             interpolation: InterpolationCheck {
@@ -520,6 +520,7 @@ fn orientation(times: &ImageTimes) -> Orientation {
                 samples: 0.01,
             }],
         },
+        centre: None,
         notes: Vec::new(),
         invalid_because: Vec::new(),
     }

@@ -7,7 +7,7 @@ import re
 import struct
 import sys
 
-POINT = {1: "PointId", 2: "PointType", 6: "Ignore", 16: "AprioriX", 17: "AprioriY", 18: "AprioriZ",
+POINT = {1: "PointId", 2: "PointType", 6: "Ignore", 7: "JigsawRejected", 16: "AprioriX", 17: "AprioriY", 18: "AprioriZ",
          19: "AprioriCovarianceMatrix", 20: "AdjustedX", 21: "AdjustedY", 22: "AdjustedZ",
          23: "AdjustedCovarianceMatrix", 9: "AprioriXYZSource", 11: "AprioriRadiusSource",
          13: "LatitudeConstrained", 14: "LongitudeConstrained", 15: "RadiusConstrained"}

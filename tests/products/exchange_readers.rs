@@ -333,6 +333,7 @@ fn a_site_of_images_has_an_item_and_no_tables() {
         names,
         [
             "README.txt",
+            "centre",
             "image_outlines.geojson",
             "kernels.json",
             "site.qgz",

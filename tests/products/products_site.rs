@@ -155,6 +155,7 @@ fn every_product_is_there_with_its_rows() {
         ("images/m04-02852/orientation.parquet", 31),
         ("images/m04-02852/orientation.json", 31),
         ("images/m04-02852/isd.json", 40),
+        ("exchange/centre/m04-02852_isd.json", 40),
         ("registered_footprints.parquet", 32),
         ("registered_footprints.csv", 32),
         ("report/index.html", 0),

@@ -31,6 +31,7 @@ fn footprints_inside_images_have_one_row_with_both_places() {
     let counted = &json(&folder.join("manifest.json"))["counts"]["registered_inside"];
     assert_eq!(*counted, inside("before_inside"));
     assert!(inside("adjusted_inside") > 0);
+    let mut compared = [0, 0];
     for row in &registered {
         assert!(row["before_inside"] == "true" || row["adjusted_inside"] == "true");
         let footprint = &footprints[row["footprint_row"].parse::<usize>().unwrap()];
@@ -43,20 +44,35 @@ fn footprints_inside_images_have_one_row_with_both_places() {
         ] {
             assert_eq!(row[name], footprint[name], "{name}");
         }
-        let [before, after] = ["before", "adjusted"].map(|round| {
-            ["line", "sample"].map(|axis| {
-                let ours = number(row, &format!("{round}_{axis}"));
-                let isis = number(row, &format!("{round}_isis_{axis}"));
-                // Rounding of numbers of some thousand pixels.
-                assert!((isis - ours - 0.5).abs() < 1e-9);
-                ours
-            })
-        });
+        let [before, after] = ["before", "adjusted"]
+            .map(|round| ["line", "sample"].map(|axis| number(row, &format!("{round}_{axis}"))));
+        let isis = |round: &str| {
+            let place = ["line", "sample"].map(|axis| format!("{round}_isis_{axis}"));
+            let is_shown = !row[&place[0]].is_empty();
+            is_shown.then(|| place.map(|name| number(row, &name) - 0.5))
+        };
+        if let Some(isis) = isis("before") {
+            // Lines: 42 m along the track at 4.4 and 4.9 m per line, and the sign of the flight.
+            let lines = before[0] - isis[0];
+            assert!((7.0..10.0).contains(&lines.abs()), "{lines}");
+            compared[0] += 1;
+        }
+        if let Some(isis) = isis("adjusted") {
+            // Pixels, as the same rays: those of the second-order model differ from the tables in the kernels.
+            let apart = (after[0] - isis[0]).hypot(after[1] - isis[1]);
+            assert!(apart < 0.5, "{apart}");
+            compared[1] += 1;
+        }
         let moved_px = (after[0] - before[0]).hypot(after[1] - before[1]);
         assert!((number(row, "moved_px") - moved_px).abs() < 1e-9);
         // The footprints inside these images are part of the adjustment.
         assert!(number(row, "sigma_up_m") > 0.0);
     }
+    // Only footprints at the ends of an image are missing in ISIS.
+    assert!(
+        compared.iter().all(|rows| rows * 10 > registered.len() * 9),
+        "{compared:?}"
+    );
     let shown = |id: &str| registered.iter().filter(|row| row["image"] == id).count();
     assert_eq!(shown("E02-00665") + shown("E02-01453"), registered.len());
 }

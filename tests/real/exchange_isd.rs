@@ -38,6 +38,8 @@ struct Real {
     site: fixture::Site,
     session: Session,
     isd: Value,
+    /// The file for ISIS and ALE.
+    isis: Value,
     _folder: tempfile::TempDir,
 }
 
@@ -81,11 +83,12 @@ fn real_with(test: &str, summing: u32, light_time: LightTime) -> Option<Real> {
     let folder = tempfile::tempdir().unwrap();
     site.with(true, |site| write_products(folder.path(), site, ""))
         .unwrap();
-    let text = fs::read(folder.path().join("images/m04-02852/isd.json")).unwrap();
+    let read = |name: &str| common::json(&folder.path().join(name));
     Some(Real {
         site,
         session,
-        isd: serde_json::from_slice(&text).unwrap(),
+        isd: read("images/m04-02852/isd.json"),
+        isis: read("exchange/centre/m04-02852_isd.json"),
         _folder: folder,
     })
 }
@@ -219,14 +222,14 @@ fn two_kernels_of_one_name_keep_their_hashes() {
 fn camera_keys_are_those_of_ale_but_for_a_list() {
     let test = "image support data beside ALE's";
     let (Some(real), Some(path)) = (
-        real(test),
+        real_with(test, 8, LightTime::Surface),
         common::real_data("ale_mgs/isds/mgsmocna_isd.json", test),
     ) else {
         return;
     };
     let truth: Value = serde_json::from_slice(&fs::read(path).unwrap()).unwrap();
     let mut found = Vec::new();
-    differing(&truth, Some(&real.isd), "", &mut found);
+    differing(&truth, Some(&real.isis), "", &mut found);
     for at in &found {
         assert!(
             DIFFERENT.iter().any(|(key, _)| at.starts_with(key)),
@@ -245,14 +248,14 @@ fn camera_keys_are_those_of_ale_but_for_a_list() {
 fn positions_and_rotations_are_those_of_ale() {
     let test = "tables beside ALE's";
     let (Some(real), Some(path)) = (
-        real(test),
+        real_with(test, 8, LightTime::Surface),
         common::real_data("ale_mgs/isds/mgsmocna_isd.json", test),
     ) else {
         return;
     };
     let truth: Value = serde_json::from_slice(&fs::read(path).unwrap()).unwrap();
     let worst = |block: &str, key: &str| {
-        let ours = Nodes::new(&real.isd[block], key);
+        let ours = Nodes::new(&real.isis[block], key);
         let end_s = ours.et_s[ours.et_s.len() - 1];
         let mut worst = 0.0_f64;
         let theirs = Nodes::new(&truth[block], key);
@@ -279,7 +282,7 @@ fn positions_and_rotations_are_those_of_ale() {
     // Interpolated at ALE's epochs: 0.01 pixels of 8 summed detectors of 3.75e-6 rad.
     assert!(worst("instrument_pointing", "quaternions") < 3e-7);
     // At its own epochs, each file holds what the kernels say.
-    for isd in [&real.isd, &truth] {
+    for isd in [&real.isis, &truth] {
         let nodes = Nodes::new(&isd["instrument_pointing"], "quaternions");
         let rates = Nodes::new(&isd["instrument_pointing"], "angular_velocities");
         for (index, et_s) in nodes.et_s.iter().enumerate() {

@@ -38,14 +38,12 @@ use areograph::{
     instruments::Instrument,
     kernel_source::{KernelList, KernelSource},
     pds::isd::read_isd,
-    products::{
-        AdjustedImage, AdjustedKernels, attitude_kernel, position_kernel, write_adjusted_kernels,
-    },
+    products::{AdjustedImage, AdjustedKernels, KernelReaders, write_adjusted_kernels},
     spice::{KernelSet, Session},
     stages::{
         group_profiles::group_profiles,
         sample_orientation::{Orientation, sample_orientation},
-        tabulate_kernels::{require_same, tabulate_kernels},
+        tabulate_kernels::{AdjustedTables, require_same, tabulate_kernels},
         tag_times::{ImageTimes, StartFrom, tag_times},
     },
     time::{Et, PointingBias},
@@ -529,8 +527,19 @@ fn adjusted_kernels_are_of_the_spacecraft_of_the_image() {
         let session = Session::open(&originals).unwrap();
         let (times, orientation) = oriented(&session, &folder, 120);
         let kernels = kernels(&folder);
-        let tables = tabulate_kernels(&session, &[&times], 0, &orientation, &kernels, &NO_BIAS);
-        (times, orientation, tables.unwrap())
+        let readers = LightTime::Centre;
+        let own = tabulate_kernels(
+            &session,
+            &[&times],
+            0,
+            &orientation,
+            readers,
+            &kernels,
+            &NO_BIAS,
+        );
+        let own = own.unwrap();
+        let centre = own.clone();
+        (times, orientation, AdjustedTables { own, centre })
     };
     let out = tempfile::tempdir().unwrap();
     let to = AdjustedKernels {
@@ -543,12 +552,22 @@ fn adjusted_kernels_are_of_the_spacecraft_of_the_image() {
         times: &times,
         tables: &tables,
         light_time: LightTime::Centre,
+        is_valid: true,
     };
     write_adjusted_kernels(&to, &[image]).unwrap();
-    let own = [position_kernel(&times.id), attitude_kernel(&times.id)];
+    let own = KernelReaders::Run.paths(&times.id);
     let own = own.map(|name| out.path().join(name));
     let session = Session::open(&originals.followed_by(&own).unwrap()).unwrap();
-    require_same(&session, &times, &orientation, &kernels(&folder), &NO_BIAS).unwrap();
+    let readers = LightTime::Centre;
+    require_same(
+        &session,
+        &times,
+        &orientation,
+        readers,
+        &kernels(&folder),
+        &NO_BIAS,
+    )
+    .unwrap();
     let count = originals.kernels().len();
     let of_image = session.of(times.instrument.spacecraft);
     let held = &of_image.coverage().unwrap().per_kernel;

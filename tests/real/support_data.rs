@@ -545,8 +545,11 @@ fn what_is_wrong_with_real_support_data_is_said() {
             "ale_mex/isds/mexhrsc_isd.json",
             "expected epochs that cover the whole image",
         ),
-        // The pixel pitch stands where coefficients should.
-        ("ale_mgs/isds/mgsmocna_isd.json", "optical_distortion"),
+        // The pixel pitch stands where coefficients should; ALE would write the same again.
+        (
+            "ale_mgs/isds/mgsmocna_isd.json",
+            "what to do: configure the image by label and kernels. ALE always writes",
+        ),
         (
             "ale_mex/isds/mexsrc_isd.json",
             "name_model is \"USGS_ASTRO_FRAME_SENSOR_MODEL\"",

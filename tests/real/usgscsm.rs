@@ -31,9 +31,9 @@ use areograph::{
         sample_orientation::Orientation,
     },
 };
-use arrow_array::RecordBatch;
 use arrow_array::cast::AsArray as _;
 use arrow_array::types::{Float64Type, UInt32Type};
+use arrow_array::{Array as _, RecordBatch};
 use common::{
     json,
     mission::{areograph, succeed},
@@ -209,6 +209,109 @@ fn other_models_are_as_far_from_usgscsm_as_stated() {
                     .fold(0.0, f64::max);
                 println!("{image} {key}: {:.3} px, stated {error:.3}", apart[axis]);
                 assert!(apart[axis] < error + LIMIT_PX, "{image} {key}");
+            }
+        }
+    }
+}
+
+/// Lines and samples of ISIS, with 1 at the centre of the first pixel, of the rows of `registered`; `NaN` if missing.
+fn isis_places(site: &Path, name: &str) -> BTreeMap<String, Vec<[f64; 2]>> {
+    let table = table(&site.join(name));
+    let column = |name: &str| table.column_by_name(name).unwrap();
+    let images = column("image").as_string::<i32>();
+    let inside = column("inside").as_boolean();
+    let places =
+        ["isis_line", "isis_sample"].map(|name| column(name).as_primitive::<Float64Type>());
+    let mut found = BTreeMap::<String, Vec<[f64; 2]>>::new();
+    for index in (0..table.num_rows()).filter(|index| inside.value(*index)) {
+        let place = places.map(|of| {
+            if of.is_valid(index) {
+                of.value(index)
+            } else {
+                f64::NAN
+            }
+        });
+        found
+            .entry(images.value(index).to_owned())
+            .or_default()
+            .push(place);
+    }
+    found
+}
+
+/// The support data without the hash of the configuration.
+fn support_data(path: &Path) -> Value {
+    let mut support = json(path);
+    support["areograph"]["configuration_blake3"].take();
+    support
+}
+
+/// Files for ISIS do not depend on the convention of the run; usgscsm reads from them the lines and samples of ISIS, and
+/// those of a run with the convention of ISIS.
+#[test]
+fn files_for_isis_have_its_convention_in_every_run() {
+    let test = "usgscsm beside lines and samples of ISIS";
+    let runs = Runs::new();
+    let mut of_isis = BTreeMap::new();
+    for word in ["centre", "surface", "none"] {
+        let out = runs.run(&format!(
+            "[orientation]\nlight_time = \"{word}\"\n[registration]\nmodel = \"samples\"\n"
+        ));
+        for site in SITES.map(|site| out.join(site)) {
+            let isis = isis_places(&site, "registration.parquet");
+            for (image, (ground_m, places)) in registered(&site, "registration.parquet") {
+                let path = site.join(format!("exchange/centre/{image}_isd.json"));
+                let support = support_data(&path);
+                if word == "centre" {
+                    let own = json(&site.join(format!("images/{image}/isd.json")));
+                    for key in [
+                        "instrument_position",
+                        "instrument_pointing",
+                        "body_rotation",
+                    ] {
+                        assert!(support[key] == own[key], "{image} {key}");
+                    }
+                    let points = ground_m.iter().map(|point_m| format!("{point_m:?}"));
+                    let by_point: BTreeMap<_, _> = points.zip(places.clone()).collect();
+                    of_isis.insert(image.clone(), (support.clone(), by_point));
+                }
+                let (expected, by_point) = &of_isis[&image];
+                assert!(support == *expected, "{word} {image}");
+                let Some(seen) = seen(&path, &ground_m, test) else {
+                    return;
+                };
+                let (mut compared, mut most_px) = (0, 0.0_f64);
+                for ((point_m, seen), isis) in ground_m.iter().zip(&seen).zip(&isis[&image]) {
+                    let run = by_point.get(&format!("{point_m:?}"));
+                    let Some(run) = run.filter(|_| isis[0].is_finite()) else {
+                        continue;
+                    };
+                    for axis in [0, 1] {
+                        most_px = most_px.max((isis[axis] - 0.5 - seen[axis]).abs());
+                        most_px = most_px.max((run[axis] - seen[axis]).abs());
+                    }
+                    compared += 1;
+                }
+                let moved = apart(&seen, &places);
+                println!("{word} {image}: {most_px:.1e} px, {moved:.1?} from the run");
+                assert!(most_px < LIMIT_PX, "{word} {image}: {most_px} px");
+                // Nearly all footprints inside the image; ISIS has some beyond its ends.
+                assert!(
+                    compared * 10 > ground_m.len() * 9,
+                    "{word} {image}: {compared}"
+                );
+                assert_eq!(word == "centre", moved[0] < LIMIT_PX, "{word} {image}");
+            }
+            let adjusted = isis_places(&site, "registration_adjusted.parquet");
+            for (image, (_, places)) in registered(&site, "registration_adjusted.parquet") {
+                // The same rays: places at the image's very edge may be on its other side.
+                let isis = adjusted[&image].iter().zip(&places);
+                let isis = isis.filter(|(isis, _)| isis[0].is_finite());
+                let (isis, own): (Vec<_>, Vec<_>) = isis
+                    .map(|(isis, own)| ([isis[0] - 0.5, isis[1] - 0.5], *own))
+                    .unzip();
+                let [lines, samples] = apart(&isis, &own);
+                assert!(isis.len() + 1 >= places.len() && lines.max(samples) < LIMIT_PX);
             }
         }
     }

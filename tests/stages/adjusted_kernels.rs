@@ -15,20 +15,17 @@ use areograph::{
     frames::Rotation,
     geom::{attitude::matrix_of_rotation_vector, light_time::LightTime},
     line_times::LineTimes,
-    products::{
-        AdjustedImage, AdjustedKernels, Product, attitude_kernel, position_kernel,
-        write_adjusted_kernels,
-    },
+    products::{AdjustedImage, AdjustedKernels, KernelReaders, Product, write_adjusted_kernels},
     spice::{KernelRole, KernelSet, Session},
     stages::{
         reorient::{LineCorrection, reorient},
         sample_orientation::Orientation,
-        tabulate_kernels::{KernelTables, require_same, tabulate_kernels},
+        tabulate_kernels::{AdjustedTables, require_same, tabulate_kernels},
         tag_times::ImageTimes,
     },
     time::{Et, PointingBias},
 };
-use fixture::{Image, angle_rad, apart, kernel_camera};
+use fixture::{Image, angle_rad, apart, kernel_camera_by};
 use nalgebra::{Matrix3, Vector3};
 
 /// A pixel of the narrow angle, radians.
@@ -69,14 +66,22 @@ fn written(of: &Image, to: &AdjustedKernels, images: &[Adjusted]) -> Result<Vec<
     let session = Session::open(to.originals)?;
     let tabulate = |(index, image): (usize, &Adjusted)| {
         let (kernels, pointing) = (&of.kernels, to.pointing);
-        tabulate_kernels(
-            &session,
-            &times,
-            index,
-            image.orientation,
-            kernels,
-            pointing,
-        )
+        let tabulate = |readers| {
+            let orientation = image.orientation;
+            tabulate_kernels(
+                &session,
+                &times,
+                index,
+                orientation,
+                readers,
+                kernels,
+                pointing,
+            )
+        };
+        Ok(AdjustedTables {
+            own: tabulate(of.light_time)?,
+            centre: tabulate(LightTime::Centre)?,
+        })
     };
     let tables = images.iter().enumerate().map(tabulate);
     let tables = tables.collect::<Result<Vec<_>>>()?;
@@ -87,22 +92,29 @@ fn written(of: &Image, to: &AdjustedKernels, images: &[Adjusted]) -> Result<Vec<
             times,
             tables,
             light_time: of.light_time,
+            is_valid: true,
         })
         .collect();
     let products = write_adjusted_kernels(to, &adjusted)?;
     for image in images {
         let id = &image.times.id;
-        let own = [position_kernel(id), attitude_kernel(id)].map(|name| to.directory.join(name));
-        let session = Session::open(&to.originals.followed_by(&own)?)?;
-        let (kernels, pointing) = (&of.kernels, to.pointing);
-        require_same(&session, image.times, image.orientation, kernels, pointing)
-            .in_file(position_kernel(id))?;
+        for readers in KernelReaders::ALL {
+            let [position, attitude] = readers.paths(id);
+            let own = [&position, &attitude].map(|name| to.directory.join(name));
+            let session = Session::open(&to.originals.followed_by(&own)?)?;
+            let (kernels, pointing) = (&of.kernels, to.pointing);
+            let convention = readers.convention(of.light_time);
+            let (times, orientation) = (image.times, image.orientation);
+            require_same(&session, times, orientation, convention, kernels, pointing)
+                .in_file(position)?;
+        }
     }
     Ok(products)
 }
 
-/// The adjusted kernels against the original ones with the correction, at instants that are no samples.
-fn between_samples(image: &Image, set: &KernelSet, shift_lines: f64) {
+/// The adjusted kernels, as `readers` use them, against the original ones with the correction, at instants that are no
+/// samples.
+fn between_samples(image: &Image, set: &KernelSet, readers: LightTime, shift_lines: f64) {
     let instants: Vec<Et> = (0..97)
         .map(|k| {
             image
@@ -112,14 +124,15 @@ fn between_samples(image: &Image, set: &KernelSet, shift_lines: f64) {
                 .plus(image.times.duration_s() * (f64::from(k) + 0.37) / 97.0)
         })
         .collect();
-    let cameras = |set: &KernelSet, shift_s: f64| -> Vec<_> {
+    let cameras = |set: &KernelSet, by: LightTime, shift_s: f64| -> Vec<_> {
         let session = Session::open(set).unwrap();
-        let camera = |et: &Et| kernel_camera(&session, image, et.plus(shift_s));
+        let camera = |et: &Et| kernel_camera_by(&session, image, by, et.plus(shift_s));
         instants.iter().map(camera).collect()
     };
-    let found = cameras(set, 0.0);
+    let found = cameras(set, readers, 0.0);
     let original = cameras(
         &image.set,
+        image.light_time,
         shift_lines * image.times.line_times.mean_period_s(),
     );
     for ((et, found), (position_m, camera_to_mars)) in instants.iter().zip(&found).zip(original) {
@@ -135,6 +148,28 @@ fn between_samples(image: &Image, set: &KernelSet, shift_lines: f64) {
             "{distance_m} m, {turn_rad} rad"
         );
     }
+}
+
+/// Largest difference between ranges that jigsaw computes, from its position of the spacecraft, and the geometric ones.
+fn ranges_of_isis(image: &Image, set: &KernelSet, adjusted: &Orientation) -> f64 {
+    let session = Session::open(set).unwrap();
+    let mut most_m = 0.0_f64;
+    for sample in &adjusted.samples {
+        let ground_m = sample.position.xyz_m
+            + sample.camera_to_mars.matrix().column(2) * sample.boresight.unwrap().range_m;
+        let (isis_m, _) = kernel_camera_by(&session, image, LightTime::Centre, sample.et);
+        let flown_m = sample.position.xyz_m + sample.to_spacecraft_m;
+        let [isis_m, range_m] = [isis_m, flown_m].map(|from_m| (ground_m - from_m).norm());
+        most_m = most_m.max((isis_m - range_m).abs());
+    }
+    match image.light_time {
+        // Metres: MGS climbs by at most 60 m/s, which is 0.08 m in the 1.3 ms from the ground, and looks ahead or back by
+        // less than 1°, a share of 0.02 of the 4.3 m along the track.
+        LightTime::Surface | LightTime::None => assert!(most_m < 0.2, "{most_m} m"),
+        // The displacement along the radius.
+        LightTime::Centre | LightTime::Support => assert!((30.0..350.0).contains(&most_m)),
+    }
+    most_m
 }
 
 #[test]
@@ -163,9 +198,14 @@ fn sampling_with_the_adjusted_kernels_gives_the_adjusted_orientation() {
                 .iter()
                 .map(|product| product.path.display().to_string())
                 .collect();
-            let pair = [format!("adjusted/{id}.bc"), format!("adjusted/{id}.bsp")];
-            assert_eq!(paths[..2], pair);
-            assert_eq!(paths[2..], ["adjusted.tm"]);
+            let pairs = [
+                format!("adjusted/{id}.bsp"),
+                format!("adjusted/{id}.bc"),
+                format!("exchange/centre/{id}_adjusted.bsp"),
+                format!("exchange/centre/{id}_adjusted.bc"),
+            ];
+            assert_eq!(paths[..4], pairs);
+            assert_eq!(paths[4..], ["adjusted.tm"]);
             let set = KernelSet::from_metakernel(&folder.path().join("adjusted.tm")).unwrap();
             let again = image.sampled_with(&set);
             let (distance_m, turn_rad) = apart(&again, &adjusted);
@@ -187,7 +227,13 @@ fn sampling_with_the_adjusted_kernels_gives_the_adjusted_orientation() {
             }
             assert_eq!(compared, theirs.et_s.len());
             assert!(again.tables.interpolation.error_max_px < 0.02);
-            between_samples(image, &set, shift_lines);
+            between_samples(image, &set, of, shift_lines);
+            let pair = KernelReaders::Centre.paths(id);
+            let pair = pair.map(|name| folder.path().join(name));
+            let isis = image.set.followed_by(&pair).unwrap();
+            between_samples(image, &isis, LightTime::Centre, shift_lines);
+            let range_m = ranges_of_isis(image, &isis, &adjusted);
+            println!("{id} {of:?}: ranges {range_m:.3} m from jigsaw's");
             assert_eq!(
                 again.outline.unwrap().len(),
                 adjusted.outline.unwrap().len()
@@ -223,7 +269,10 @@ fn the_metakernel_lists_the_adjusted_kernels_last_and_the_comments_say_the_rule(
     for name in ["adjusted/E02-02016.bsp", "adjusted/E02-02016.bc"] {
         let comment = comment(name);
         assert!(comment.contains("is stored at t - 1.150 s"), "{name}");
-        assert!(comment.contains("load the file as it is"), "{name}");
+        assert!(
+            comment.contains("ISIS and ALE apply this offset, too"),
+            "{name}"
+        );
     }
     // Outside the image with its padding the original kernels rule, as before.
     let after = image
@@ -298,7 +347,7 @@ fn two_images_share_a_metakernel() {
         orientation: &adjusted[index],
     });
     let products = written(&images[0], &kernels_of(&images[0], folder.path()), &both).unwrap();
-    assert_eq!(products.len(), 5);
+    assert_eq!(products.len(), 9); // two pairs each, and the metakernel
     let set = KernelSet::from_metakernel(&folder.path().join("adjusted.tm")).unwrap();
     for (image, adjusted) in images.iter().zip(&adjusted) {
         let (distance_m, turn_rad) = apart(&image.sampled_with(&set), adjusted);
@@ -373,17 +422,12 @@ fn orientations_that_are_none_and_kernels_that_end_are_refused() {
             .to_string()
             .contains("0 orientation samples")
     );
-    let tables = KernelTables {
-        epochs: Vec::new(),
-        states: Vec::new(),
-        ticks: Vec::new(),
-        quaternions: Vec::new(),
-        rates_rad_s: Vec::new(),
-    };
+    let tables = AdjustedTables::default();
     let nothing = AdjustedImage {
         times: &image.times,
         tables: &tables,
         light_time: image.light_time,
+        is_valid: true,
     };
     let failure = write_adjusted_kernels(&to, &[nothing]).unwrap_err();
     assert!(failure.to_string().contains("it contains no instants"));

@@ -365,9 +365,9 @@ fn a_control_network_is_read_again_as_it_was_written() {
     let path = folder.path().join("exchange/adjusted.pvl");
     assert_eq!(write_control_network(&path, &network).unwrap(), 4);
     let file = read_ties(&path).unwrap();
-    // The point that says to be ignored, and nothing else.
-    assert_eq!((file.ignored, file.complaints.len()), (1, 0));
-    assert_eq!(file.ties.len(), 3);
+    // As in jigsaw, the next adjustment tries a rejected point again.
+    assert_eq!((file.ignored, file.complaints.len()), (0, 0));
+    assert_eq!(file.ties.len(), 4);
     for (read, written) in file.ties.iter().zip(&network.points) {
         assert_eq!((&*read.id, read.known), (written.id, written.known));
         assert_eq!(read.measures.len(), 2);
@@ -388,8 +388,10 @@ fn a_control_network_is_read_again_as_it_was_written() {
         assert_eq!(read, "4 points, 8 measures\n");
     }
     let text = fs::read_to_string(&path).unwrap();
+    assert!(!text.contains("Ignore"), "a user's decision");
     for line in [
         "    PointType = Constrained\n    PointId = \"it's constrained\"\n",
+        "    PointId = \"rejected\"\n    JigsawRejected = True\n",
         "      JigsawRejected = True\n",
         "      LineResidual = -0.125 <pixels>\n",
         "    AdjustedCovarianceMatrix = (9e1, 2e1, -1.2e1, 6e1, 7e0, 1.1e2)\n",

@@ -74,12 +74,13 @@ impl LightTime {
         }
     }
 
-    /// The interval of instants at which positions are read for `exposures`.
+    /// The interval of instants at which positions are read for `exposures`; files for ISIS and ALE need positions with
+    /// light time in every convention of a run.
     #[must_use]
     pub fn read_over(self, exposures: Interval) -> Interval {
         match self {
-            Self::None | Self::Support => exposures,
-            Self::Surface | Self::Centre => {
+            Self::Support => exposures,
+            Self::None | Self::Surface | Self::Centre => {
                 Interval::new(exposures.start.plus(-Self::REACH_S), exposures.stop)
             }
         }
@@ -144,8 +145,8 @@ mod tests {
     #[test]
     fn positions_are_read_earlier_where_light_takes_its_time() {
         let exposures = Interval::new(Et::from_seconds(10.0), Et::from_seconds(20.0));
-        assert_eq!(LightTime::None.read_over(exposures), exposures);
-        for light_time in [LightTime::Surface, LightTime::Centre] {
+        assert_eq!(LightTime::Support.read_over(exposures), exposures);
+        for (_, light_time) in LightTime::WORDS {
             let read = light_time.read_over(exposures);
             assert!((exposures.start.since(read.start) - 0.2).abs() < 1e-12); // rounding
             assert_eq!(read.stop, exposures.stop);

@@ -1,15 +1,16 @@
 //! Adjusted orientations as SPICE kernels that are loaded after the original ones; their contents are tabulated by
-//! [`areograph_stages::tabulate_kernels`].
+//! [`areograph_stages::tabulate_kernels`]. There are two pairs for each image, see [`KernelReaders`].
 
 use std::{
     fs,
     path::{Path, PathBuf},
+    ptr,
 };
 
 use super::{
     files::write_text,
     product::{Content, Context, Declaration, Product, Program, Role, Use, Write, Written},
-    site::AdjustmentProducts,
+    site::{AdjustmentProducts, SiteProducts},
 };
 use areograph_base::{
     constants::NAIF_MARS,
@@ -20,7 +21,10 @@ use areograph_geom::light_time::LightTime;
 use areograph_spice::{
     EncodedCkSegment, Kernel, KernelSet, SpkSegment, write_encoded_ck, write_spk,
 };
-use areograph_stages::{tabulate_kernels::KernelTables, tag_times::ImageTimes};
+use areograph_stages::{
+    tabulate_kernels::{AdjustedTables, KernelTables},
+    tag_times::ImageTimes,
+};
 
 /// Tolerance within which a bias is the usual one, seconds.
 const BIAS_TOLERANCE_S: f64 = 1e-9;
@@ -34,9 +38,11 @@ pub struct AdjustedImage<'a> {
     /// Line times.
     pub times: &'a ImageTimes,
     /// States and attitudes.
-    pub tables: &'a KernelTables,
-    /// The convention of their adjustment.
+    pub tables: &'a AdjustedTables,
+    /// The convention of the run.
     pub light_time: LightTime,
+    /// Whether its orientation is valid.
+    pub is_valid: bool,
 }
 
 /// Destination of the kernels, and the kernels that they replace.
@@ -52,30 +58,111 @@ pub struct AdjustedKernels<'a> {
     pub pointing: &'a PointingConfig,
 }
 
-pub(super) static ATTITUDE: Declaration = Declaration {
-    path: "adjusted/<image>.bc",
-    what: "adjusted attitude of the bus around the time of the image, J2000 (CK type 3)",
-    readers: "SPICE, ISIS, ALE",
-    rows: "epochs",
-    role: Role::Data,
-    content: Content::Foreign,
-    write: Write::WithAnother,
-    uses: &[Use {
-        program: Program::AdjustedKernels,
-        lines: "spiceinit from=<image>.cub spk=../adjusted/<image>.bsp ck=../adjusted/<image>.bc",
-    }],
-};
+/// Readers of a pair of adjusted kernels. Kernels hold geometric states, from which a reader computes the camera by its own
+/// convention for light time: each pair gives its readers the adjusted rays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum KernelReaders {
+    /// Readers with the convention of the run: areograph, and SPICE.
+    Run,
+    /// ISIS and ALE.
+    Centre,
+}
 
-pub(super) static POSITION: Declaration = Declaration {
-    path: "adjusted/<image>.bsp",
-    what: "adjusted geometric position of the spacecraft relative to {body} around the time of the image, J2000 (SPK type 13)",
-    readers: "SPICE, ISIS, ALE",
-    rows: "epochs",
-    role: Role::Data,
-    content: Content::Foreign,
-    write: Write::WithAnother,
-    uses: &[],
-};
+impl KernelReaders {
+    /// All of them.
+    pub const ALL: [Self; 2] = [Self::Run, Self::Centre];
+
+    /// Position and attitude.
+    const fn declarations(self) -> [&'static Declaration; 2] {
+        match self {
+            Self::Run => [&POSITION, &ATTITUDE],
+            Self::Centre => [&CENTRE_POSITION, &CENTRE_ATTITUDE],
+        }
+    }
+
+    /// Paths of the SPK and the CK of an image below the folder of the products.
+    #[must_use]
+    pub fn paths(self, image: &str) -> [String; 2] {
+        self.declarations().map(|of| of.path_of(image))
+    }
+
+    /// The convention by which these readers compute the camera, in a run with the convention `run`.
+    #[must_use]
+    pub const fn convention(self, run: LightTime) -> LightTime {
+        match self {
+            Self::Run => run,
+            Self::Centre => LightTime::Centre,
+        }
+    }
+
+    /// Whether they have a pair of an image whose orientation is valid or not. With an attitude that jumps, so does the light
+    /// time along the boresight, which only states for readers with the same convention can follow.
+    #[must_use]
+    pub const fn have(self, is_valid: bool) -> bool {
+        matches!(self, Self::Run) || is_valid
+    }
+
+    const fn tables(self, of: &AdjustedTables) -> &KernelTables {
+        match self {
+            Self::Run => &of.own,
+            Self::Centre => &of.centre,
+        }
+    }
+}
+
+/// A kernel of a pair.
+const fn kernel(
+    path: &'static str,
+    what: &'static str,
+    readers: &'static str,
+    uses: &'static [Use],
+) -> Declaration {
+    Declaration {
+        path,
+        what,
+        readers,
+        rows: "epochs",
+        role: Role::Data,
+        content: Content::Foreign,
+        write: Write::WithAnother,
+        uses,
+    }
+}
+
+/// Readers of the pair with the convention of the run.
+const RUN: &str = "areograph, SPICE (not ISIS, ALE)";
+/// Readers of the pair with light time to the centre.
+const CENTRE: &str = "ISIS, ALE";
+
+pub(super) static ATTITUDE: Declaration = kernel(
+    "adjusted/<image>.bc",
+    "adjusted attitude of the bus around the time of the image, J2000 (CK type 3)",
+    RUN,
+    &[],
+);
+pub(super) static POSITION: Declaration = kernel(
+    "adjusted/<image>.bsp",
+    "positions of the spacecraft relative to {body}, from which the light-time convention of the run gives the adjusted \
+     camera of the image, J2000 (SPK type 13)",
+    RUN,
+    &[],
+);
+pub(super) static CENTRE_ATTITUDE: Declaration = kernel(
+    "exchange/centre/<image>_adjusted.bc",
+    "attitude of the bus from which ISIS and ALE compute the adjusted camera of a valid image, J2000 (CK type 3)",
+    CENTRE,
+    &[Use {
+        program: Program::AdjustedKernels,
+        lines: "spiceinit from=<image>.cub spk=centre/<image>_adjusted.bsp ck=centre/<image>_adjusted.bc",
+    }],
+);
+pub(super) static CENTRE_POSITION: Declaration = kernel(
+    "exchange/centre/<image>_adjusted.bsp",
+    "positions of the spacecraft relative to {body}, from which ISIS and ALE compute the adjusted camera of a valid image, \
+     J2000 (SPK type 13)",
+    CENTRE,
+    &[],
+);
 
 pub(super) static METAKERNEL: Declaration = Declaration {
     path: "adjusted.tm",
@@ -87,6 +174,17 @@ pub(super) static METAKERNEL: Declaration = Declaration {
     write: Write::Several(of_site),
     uses: &[],
 };
+
+/// Whether the image with this index has this kernel. Images with support data get none.
+pub(super) fn has(site: &SiteProducts, kernel: &Declaration, index: usize) -> bool {
+    let adjusted = site.adjustment().map(|(_, adjustment)| adjustment.images);
+    adjusted.is_some_and(|images| {
+        let is_valid = images[index].invalid_because().is_empty();
+        let mut readers = KernelReaders::ALL.into_iter();
+        let readers = readers.find(|of| of.declarations().iter().any(|of| of.path == kernel.path));
+        images[index].times.support.is_none() && readers.is_some_and(|of| of.have(is_valid))
+    })
+}
 
 /// The adjusted kernels of a site.
 fn of_site(of: &Context, adjustment: &AdjustmentProducts) -> Result<Vec<Written>> {
@@ -102,11 +200,13 @@ fn of_site(of: &Context, adjustment: &AdjustmentProducts) -> Result<Vec<Written>
         times: image.times,
         tables,
         light_time: image.orientation.light_time.convention,
+        is_valid: image.invalid_because().is_empty(),
     });
     written(&to, &images.collect::<Vec<_>>())
 }
 
-/// Writes an SPK and a CK of every image, and the metakernel.
+/// Writes the pairs of an SPK and a CK of every image, and the metakernel of the pairs for readers with the convention of
+/// the run.
 ///
 /// # Errors
 /// [`Kind::Bug`](areograph_base::error::Kind::Bug) for tables that no kernel can hold, and for a session that is open on this
@@ -128,19 +228,27 @@ fn written(to: &AdjustedKernels, images: &[AdjustedImage]) -> Result<Vec<Written
         let path = PathBuf::from(path);
         written.push((Product { path, rows }, declaration));
     };
-    let folder = to.directory.join("adjusted");
-    fs::create_dir_all(&folder)
-        .map_err(IoError::on("make the folder"))
-        .in_file(&folder)?;
-    for image in images {
-        let name = attitude_kernel(&image.times.id);
-        let rows = write_attitude(&to.directory.join(&name), image, &comment(image, to))?;
-        add(name, rows, &ATTITUDE);
-    }
-    for image in images {
-        let name = position_kernel(&image.times.id);
-        let rows = write_position(&to.directory.join(&name), image, &comment(image, to))?;
-        add(name, rows, &POSITION);
+    for readers in KernelReaders::ALL {
+        for declaration in readers.declarations() {
+            for image in images.iter().filter(|image| readers.have(image.is_valid)) {
+                let name = declaration.path_of(&image.times.id);
+                let path = to.directory.join(&name);
+                if let Some(folder) = path.parent() {
+                    fs::create_dir_all(folder)
+                        .map_err(IoError::on("make the folder"))
+                        .in_file(folder)?;
+                }
+                let tables = readers.tables(image.tables);
+                let comment = comment(image, readers, to);
+                let is_position = ptr::eq(declaration, readers.declarations()[0]);
+                let rows = if is_position {
+                    write_position(&path, image, tables, &comment)
+                } else {
+                    write_attitude(&path, image, tables, &comment)
+                };
+                add(name, rows?, declaration);
+            }
+        }
     }
     let path = to.directory.join(METAKERNEL.path);
     write_text(&path, &metakernel(to, images)?)?;
@@ -148,25 +256,17 @@ fn written(to: &AdjustedKernels, images: &[AdjustedImage]) -> Result<Vec<Written
     Ok(written)
 }
 
-/// Path of the SPK of an image below the folder of the products, the longest path that CSPICE writes there.
-#[must_use]
-pub fn position_kernel(image: &str) -> String {
-    POSITION.path_of(image)
-}
-
-/// Path of the CK of an image below the folder of the products.
-#[must_use]
-pub fn attitude_kernel(image: &str) -> String {
-    ATTITUDE.path_of(image)
-}
-
 fn segment_name(image: &AdjustedImage) -> String {
     let id = image.times.id.chars();
     id.take(SEGMENT_NAME_MAX).collect()
 }
 
-fn write_attitude(path: &Path, image: &AdjustedImage, comment: &str) -> Result<u64> {
-    let tables = image.tables;
+fn write_attitude(
+    path: &Path,
+    image: &AdjustedImage,
+    tables: &KernelTables,
+    comment: &str,
+) -> Result<u64> {
     let segment = EncodedCkSegment {
         bus: image.times.instrument.spacecraft.bus,
         name: &segment_name(image),
@@ -179,8 +279,12 @@ fn write_attitude(path: &Path, image: &AdjustedImage, comment: &str) -> Result<u
     Ok(tables.ticks.len() as u64)
 }
 
-fn write_position(path: &Path, image: &AdjustedImage, comment: &str) -> Result<u64> {
-    let tables = image.tables;
+fn write_position(
+    path: &Path,
+    image: &AdjustedImage,
+    tables: &KernelTables,
+    comment: &str,
+) -> Result<u64> {
     let segment = SpkSegment {
         target: image.times.instrument.spacecraft.naif,
         centre: NAIF_MARS,
@@ -194,12 +298,12 @@ fn write_position(path: &Path, image: &AdjustedImage, comment: &str) -> Result<u
 }
 
 /// Text of the comment areas of both kernels.
-fn comment(image: &AdjustedImage, to: &AdjustedKernels) -> String {
+fn comment(image: &AdjustedImage, readers: KernelReaders, to: &AdjustedKernels) -> String {
     let times = image.times;
     let bias_s = to.pointing.bias_of(&times.instrument).seconds();
     let usual_s = times.instrument.pointing.ck_bias_s;
     let others = if (bias_s - usual_s).abs() < BIAS_TOLERANCE_S {
-        "ISIS and ALE apply this offset: load the file as it is.".to_owned()
+        "ISIS and ALE apply this offset, too.".to_owned()
     } else {
         format!(
             "ISIS and ALE always read the attitude at an offset of {usual_s:.3} s: do not use this\n\
@@ -228,7 +332,7 @@ fn comment(image: &AdjustedImage, to: &AdjustedKernels) -> String {
         version = env!("CARGO_PKG_VERSION"),
         exposed = times.exposures(),
         utc = times.utc_start,
-        positions = positions(image.light_time),
+        positions = positions(readers.convention(image.light_time)),
         sign = if bias_s < 0.0 { '-' } else { '+' },
         size = bias_s.abs(),
     )
@@ -238,32 +342,28 @@ fn comment(image: &AdjustedImage, to: &AdjustedKernels) -> String {
 const fn positions(light_time: LightTime) -> &'static str {
     match light_time {
         LightTime::Surface => {
-            "The positions were adjusted with light time to the\n\
+            "This file is for readers that apply light time to the\n\
              surface and aberration: an exposure has the position of the instant at which the light left the\n\
              ground. Programs that compute the spacecraft position from the centre of Mars (LT+S: ISIS, ALE) obtain\n\
-             a different position."
+             a different position: load the files in exchange/centre there."
         }
         LightTime::None | LightTime::Support => {
-            "The positions were adjusted without light time:\n\
+            "This file is for readers that apply no light time:\n\
              an exposure has the position of its own instant. Programs that compute the spacecraft position from\n\
-             the centre of Mars (LT+S: ISIS, ALE) obtain a different position."
+             the centre of Mars (LT+S: ISIS, ALE) obtain a different position: load the files in exchange/centre there."
         }
         LightTime::Centre => {
-            "The positions were adjusted as seen from the centre\n\
-             of Mars with light time and aberration: programs that apply both (LT+S: ISIS, ALE)\n\
-             obtain the adjusted positions."
+            "This file is for programs that compute the position as\n\
+             seen from the centre of Mars with light time and aberration (LT+S: ISIS, ALE): only they obtain the\n\
+             adjusted positions."
         }
     }
 }
 
 /// The original kernels, followed by the kernels of all images.
 fn metakernel(to: &AdjustedKernels, images: &[AdjustedImage]) -> Result<String> {
-    let names = images.iter().flat_map(|image| {
-        [
-            position_kernel(&image.times.id),
-            attitude_kernel(&image.times.id),
-        ]
-    });
+    let names = images.iter();
+    let names = names.flat_map(|image| KernelReaders::Run.paths(&image.times.id));
     let names: Vec<PathBuf> = names.map(PathBuf::from).collect();
     let files: Vec<PathBuf> = names.iter().map(|name| to.directory.join(name)).collect();
     let own = KernelSet::from_files(&files)?;

@@ -12,8 +12,9 @@
 //!   pixels.
 //! * The line of the detector is taken at coordinate 0 (`losToEcf`), so its centre is 0, or the value that places a
 //!   line off the boresight there.
-//! * `usgscsm` corrects no light time itself: positions follow the convention of the run. ALE's positions are seen from
-//!   the centre of Mars; they are available with `light_time = "centre"`.
+//! * `usgscsm` corrects no light time itself: positions follow the convention of the run, and in `exchange/centre` the one
+//!   of ISIS and ALE, seen from the centre of Mars. After an adjustment the rays are the same in both conventions, and so
+//!   is the file.
 //! * Pointing is sampled from before the first line to after the last; ALE's table starts 1.15 s late. Nodes are
 //!   as dense as an interpolation error below 0.01 pixels requires, which is measured and stated.
 //! * Distortion of the narrow angle is zero, as the instrument kernel states. ALE repeats the pixel pitch in these
@@ -42,7 +43,7 @@ use areograph_base::{
 };
 use areograph_geom::{attitude::continuous_quaternions, pushbroom::Distortion};
 use areograph_stages::{
-    sample_orientation::{CameraTables, InterpolationCheck},
+    sample_orientation::{CameraTables, InterpolationCheck, LightTimeEffect},
     tag_times::ImageTimes,
 };
 use areograph_store::stage::Round;
@@ -63,32 +64,87 @@ pub(super) static ISD: Declaration = Declaration {
     rows: "table nodes",
     role: Role::Data,
     content: Content::Document(schema),
-    write: Write::Image(|path, of, image| write(path, of, image, Round::Initial)),
+    write: Write::Image(|path, of, image| write(path, of, &View::of(image, Round::Initial))),
     uses: &[Use {
         program: Program::CameraModel,
         lines: "usgscsm_cam_test --model ../images/<image>/isd.json --sample-rate 100",
     }],
 };
 
+pub(super) static CENTRE: Declaration = Declaration {
+    path: "exchange/centre/<image>_isd.json",
+    what: "camera model before an adjustment as ISIS and ALE derive it from the kernels: light time to the centre of {body}",
+    readers: "ISIS, ALE, Ames Stereo Pipeline",
+    rows: "table nodes",
+    role: Role::Data,
+    content: Content::Document(schema),
+    write: Write::ImageWhere {
+        images: "every image without support data",
+        has: |site, index| site.images[index].times.support.is_none(),
+        write: |path, of, index| {
+            let image = &of.site.images[index];
+            let (tables, light_time) = image.orientation.as_isis_sees(image.times);
+            let view = View {
+                tables: &tables,
+                light_time,
+                convention: ", the convention of ISIS and ALE",
+                ..View::of(image, Round::Initial)
+            };
+            write(path, of, &view)
+        },
+    },
+    uses: &[Use {
+        program: Program::CameraModel,
+        lines: "usgscsm_cam_test --model centre/<image>_isd.json --sample-rate 100",
+    }],
+};
+
 pub(super) static ADJUSTED: Declaration = Declaration {
     path: "images/<image>/adjusted_isd.json",
-    what: "adjusted camera model, with positions in the light-time convention of the run",
+    what: "adjusted camera model; its rays are those of all adjusted products, in every light-time convention",
     readers: "usgscsm, Ames Stereo Pipeline, ISIS",
     rows: "table nodes",
     role: Role::Data,
     content: Content::Document(schema),
-    write: Write::AdjustedImage(|path, of, image| write(path, of, image, Round::Adjusted)),
+    write: Write::AdjustedImage(|path, of, image| {
+        write(path, of, &View::of(image, Round::Adjusted))
+    }),
     uses: &[],
 };
 
-fn write(path: &Path, of: &Context, image: &ImageProducts, round: Round) -> Result<u64> {
-    write_json(path, &isd(of.site, image, round))?;
-    Ok(image.orientation.tables.et_s.len() as u64)
+/// An image by one light-time convention.
+struct View<'a> {
+    times: &'a ImageTimes,
+    tables: &'a CameraTables,
+    light_time: &'a LightTimeEffect,
+    round: Round,
+    /// Whose convention it is, a clause for readers.
+    convention: &'static str,
 }
 
-fn isd<'a>(site: &SiteProducts<'a>, image: &ImageProducts<'a>, round: Round) -> Isd<'a> {
-    let times = image.times;
-    let tables = &image.orientation.tables;
+impl<'a> View<'a> {
+    /// The image by its own convention.
+    const fn of(image: &ImageProducts<'a>, round: Round) -> Self {
+        Self {
+            times: image.times,
+            tables: &image.orientation.tables,
+            light_time: &image.orientation.light_time,
+            round,
+            convention: match image.times.support {
+                Some(_) => "",
+                None => ", the convention of the whole run",
+            },
+        }
+    }
+}
+
+fn write(path: &Path, of: &Context, view: &View) -> Result<u64> {
+    write_json(path, &isd(of.site, view))?;
+    Ok(view.tables.et_s.len() as u64)
+}
+
+fn isd<'a>(site: &SiteProducts<'a>, view: &View<'a>) -> Isd<'a> {
+    let &View { times, tables, .. } = view;
     let start_s = times.line_times.start().seconds();
     // Half the time of the delivered lines: camera models know no other lines.
     let half_s = 0.5 * times.line_times.seconds(f64::from(times.lines_delivered));
@@ -150,7 +206,7 @@ fn isd<'a>(site: &SiteProducts<'a>, image: &ImageProducts<'a>, round: Round) -> 
         instrument_position: positions(&tables.et_s, &tables.position_m, &tables.velocity_m_s),
         sun_position: sun_position(tables),
         kernels: kernels_by_type(site),
-        areograph: provenance(site, image, round),
+        areograph: provenance(site, view),
     }
 }
 
@@ -306,13 +362,9 @@ fn attitude_source(times: &ImageTimes) -> String {
 }
 
 /// Notes for readers of this file; camera models ignore them.
-fn provenance<'a>(
-    site: &SiteProducts<'a>,
-    image: &ImageProducts<'a>,
-    round: Round,
-) -> Provenance<'a> {
-    let times = image.times;
-    let interpolation = &image.orientation.tables.interpolation;
+fn provenance<'a>(site: &SiteProducts<'a>, view: &View<'a>) -> Provenance<'a> {
+    let times = view.times;
+    let interpolation = &view.tables.interpolation;
     let detector = times.detector();
     let distortion = if detector.distortion == Distortion::NONE {
         let source = times.support.as_ref();
@@ -344,7 +396,7 @@ fn provenance<'a>(
             within_limit: interpolation.keeps_limit(),
         },
         kernels: kernels.collect(),
-        light_time: &image.orientation.light_time,
+        light_time: view.light_time,
         line_period_s: times.line_times.mean_period_s(),
         lines_header: times.line_times.lines(),
         notes: vec![
@@ -358,9 +410,9 @@ fn provenance<'a>(
             distortion,
             format!(
                 "instrument_position: {}{}; reading programs must not add any{}",
-                image.orientation.light_time.convention.positions(),
-                if times.support.is_some() { "" } else { ", the convention of the whole run" },
-                match round {
+                view.light_time.convention.positions(),
+                view.convention,
+                match view.round {
                     Round::Initial | Round::Matching => "",
                     Round::Adjusted => "; with the correction and the shift of line times in ../../adjustment.json",
                 },
@@ -368,7 +420,7 @@ fn provenance<'a>(
             format!(
                 "instrument_pointing: attitude of each epoch {}{}",
                 attitude_source(times),
-                match round {
+                match view.round {
                     Round::Initial | Round::Matching => "",
                     Round::Adjusted => {
                         ", rotated by the correction and shifted with the lines; the attitude belongs to \

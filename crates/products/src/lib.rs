@@ -67,9 +67,7 @@ mod ties;
 
 use std::path::Path;
 
-pub use adjusted_kernels::{
-    AdjustedImage, AdjustedKernels, attitude_kernel, position_kernel, write_adjusted_kernels,
-};
+pub use adjusted_kernels::{AdjustedImage, AdjustedKernels, KernelReaders, write_adjusted_kernels};
 pub use adjustment::ADJUSTMENT;
 pub use archive::{
     ArchiveProducts, WorstProfile, profile_name, write_archive_products, write_profile_shots,

@@ -1,6 +1,7 @@
 //! Products that a site will have, before they are written: for the report, which links to them.
 
 use super::{
+    adjusted_kernels,
     exchange::{adjusted::LIDAR, stac::ITEM},
     figures::FIGURE,
     page::OVERLAYS,
@@ -23,8 +24,7 @@ pub fn listed(site: &SiteProducts, declarations: &[&'static Declaration]) -> Vec
         };
         let images = match declaration.write {
             Write::Image(_) | Write::AdjustedImage(_) => images(&|_| true),
-            // Images with support data get no kernels.
-            Write::WithAnother => images(&|index| site.images[index].times.support.is_none()),
+            Write::WithAnother => images(&|index| adjusted_kernels::has(site, declaration, index)),
             Write::ImageWhere { has, .. } => images(&|index| has(site, index)),
             _ => vec![None],
         };

@@ -30,7 +30,7 @@ use areograph_stages::{
     orientation::Orientation,
     register::{ImageRegistration, RegisteredPoints},
     search_footprints::SearchResult,
-    tabulate_kernels::KernelTables,
+    tabulate_kernels::AdjustedTables,
 };
 use areograph_store::{
     book::Book,
@@ -135,7 +135,7 @@ fn page_book(site: &SiteProducts) -> Result<Book> {
     let mut book = site.book.lightened()?;
     book.enter_value("configuration", stored)?;
     book.leave_out::<SearchResult>();
-    book.leave_out::<KernelTables>();
+    book.leave_out::<AdjustedTables>();
     for round in [Round::Initial, Round::Matching, Round::Adjusted] {
         book.change(round, |_, of: &Orientation| Some(of.without_tables()))?;
     }

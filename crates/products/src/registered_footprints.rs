@@ -14,6 +14,7 @@ use super::{
     gis::Features,
     parquet,
     product::{Content, Context, Declaration, Program, Role, Use, Write},
+    registration,
     site::{ImageProducts, SiteProducts},
     table::{Column, Meaning, Table, Unit, column, meanings},
     text_table,
@@ -24,8 +25,6 @@ use areograph_stages::{
     register::RegisteredPoints,
 };
 
-/// Lines and samples of ISIS count from 1 at the centre of the first pixel, ours from 0 at its edge.
-const ISIS_OFFSET: f64 = 0.5;
 /// Sites with these products.
 const SITES: &str = "a site with footprints inside its images";
 /// Table of the GeoPackage.
@@ -127,6 +126,8 @@ struct Row<'a> {
 struct Place {
     line: f64,
     sample: f64,
+    isis_line: Option<f64>,
+    isis_sample: Option<f64>,
     inside: bool,
     extrapolated: bool,
 }
@@ -136,6 +137,8 @@ impl Place {
         Self {
             line: points.line[at],
             sample: points.sample[at],
+            isis_line: registration::isis(points.isis_line[at]),
+            isis_sample: registration::isis(points.isis_sample[at]),
             inside: points.inside[at],
             extrapolated: points.extrapolated[at],
         }
@@ -350,40 +353,39 @@ fn ground<'a>() -> Vec<Column<Row<'a>>> {
 
 /// Place in the image.
 fn image<'a>() -> Vec<Column<Row<'a>>> {
-    type Of = fn(Place) -> f64;
+    type Of = fn(Place) -> Option<f64>;
     let ours = "coordinate in the image, 0 at the leading edge of the first line or pixel, 0.5 at its centre";
-    let isis = "coordinate in the image as in ISIS: 1 at the centre of the first line or pixel";
     let of: [([&'static str; 2], Unit, Of, &'static str); 4] = [
         (
             ["before_line", "adjusted_line"],
             Unit::Line,
-            |of| of.line,
+            |of| Some(of.line),
             ours,
         ),
         (
             ["before_sample", "adjusted_sample"],
             Unit::Pixel,
-            |of| of.sample,
+            |of| Some(of.sample),
             ours,
         ),
         (
             ["before_isis_line", "adjusted_isis_line"],
             Unit::Line,
-            |of| of.line + ISIS_OFFSET,
-            isis,
+            |of| of.isis_line,
+            registration::ISIS_LINE,
         ),
         (
             ["before_isis_sample", "adjusted_isis_sample"],
             Unit::Pixel,
-            |of| of.sample + ISIS_OFFSET,
-            isis,
+            |of| of.isis_sample,
+            registration::ISIS_SAMPLE,
         ),
     ];
     let mut columns = Vec::new();
     for round in 0..2 {
         for (names, unit, of, meaning) in of {
             columns.push(column(names[round], unit, meaning, move |row: &Row| {
-                row.places[round].map(of)
+                of(row.places[round]?)
             }));
         }
     }

@@ -26,7 +26,7 @@ const DEFINITIONS: [(&str, &str); 7] = [
     (
         "line, sample",
         "0 at the start of the first line and the outer edge of the first pixel, 0.5 at their centres; \
-        lines of the header image. ISIS counts from 1 at the centre: add 0.5",
+        lines of the header image, by the light-time convention of the run",
     ),
     (
         "points",
@@ -57,6 +57,18 @@ const DEFINITIONS: [(&str, &str); 7] = [
         "line found by the iteration minus the line of Newton's method with the same model",
     ),
 ];
+
+/// Meaning of a line of ISIS.
+pub(super) const ISIS_LINE: &str = "line in ISIS (qview, campt), 1 at the centre of the first line of the image file: before the adjustment with the \
+     original kernels, after it with those of exchange/centre; missing outside the file";
+/// Meaning of a sample of ISIS.
+pub(super) const ISIS_SAMPLE: &str =
+    "sample in ISIS, 1 at the centre of the first pixel, with the same kernels as the line in ISIS";
+
+/// A line or sample of ISIS, if there is one.
+pub(super) fn isis(place: f64) -> Option<f64> {
+    (place > 0.0).then_some(place)
+}
 
 #[derive(Serialize, JsonSchema)]
 #[schemars(
@@ -202,6 +214,14 @@ fn table<'a>(site: &'a SiteProducts<'a>, images: &'a [ImageProducts<'a>]) -> Tab
 }
 
 fn columns<'a>() -> Vec<Column<Registered<'a>>> {
+    [names(), places(), searches()]
+        .into_iter()
+        .flatten()
+        .collect()
+}
+
+/// Names of the image and the footprint.
+fn names<'a>() -> Vec<Column<Registered<'a>>> {
     vec![
         column(
             "image",
@@ -221,6 +241,12 @@ fn columns<'a>() -> Vec<Column<Registered<'a>>> {
             "row of the footprint in footprints.parquet, counted from 0",
             |point: &Registered| point.get(|points| &points.row),
         ),
+    ]
+}
+
+/// Coordinates in the image.
+fn places<'a>() -> Vec<Column<Registered<'a>>> {
+    vec![
         column(
             "line",
             Unit::Line,
@@ -232,6 +258,15 @@ fn columns<'a>() -> Vec<Column<Registered<'a>>> {
             Unit::Pixel,
             DEFINITIONS[0].1,
             |point: &Registered| point.get(|points| &points.sample),
+        ),
+        column("isis_line", Unit::Line, ISIS_LINE, |point: &Registered| {
+            isis(point.get(|points| &points.isis_line))
+        }),
+        column(
+            "isis_sample",
+            Unit::Pixel,
+            ISIS_SAMPLE,
+            |point: &Registered| isis(point.get(|points| &points.isis_sample)),
         ),
         column(
             "line_offset",
@@ -252,6 +287,12 @@ fn columns<'a>() -> Vec<Column<Registered<'a>>> {
             "distance from the camera to the footprint, metres",
             |point: &Registered| point.get(|points| &points.range_m),
         ),
+    ]
+}
+
+/// The search for the line, and what it found.
+fn searches<'a>() -> Vec<Column<Registered<'a>>> {
+    vec![
         column(
             "residual_px",
             Unit::Pixel,

@@ -23,6 +23,7 @@ static FIRST: &[&Declaration] = &[
     &orientation::TABLE,
     &orientation::DOCUMENT,
     &isd::ISD,
+    &isd::CENTRE,
     &overlays::PICTURE,
     &overlays::MARKS,
     &ties::TABLE,
@@ -38,6 +39,8 @@ static FIRST: &[&Declaration] = &[
     &isd::ADJUSTED,
     &adjusted_kernels::ATTITUDE,
     &adjusted_kernels::POSITION,
+    &adjusted_kernels::CENTRE_ATTITUDE,
+    &adjusted_kernels::CENTRE_POSITION,
     &adjusted_kernels::METAKERNEL,
 ];
 

@@ -30,7 +30,7 @@ use areograph_stages::{
     read_ties::Ties,
     register::ImageRegistration,
     sample_orientation::Orientation,
-    tabulate_kernels::KernelTables,
+    tabulate_kernels::AdjustedTables,
     tag_times::{ImageTimes, used_biases},
 };
 use areograph_store::{
@@ -135,7 +135,7 @@ pub struct AdjustmentProducts<'a> {
     /// The images with their adjusted orientation, in the order of the site's.
     pub images: &'a [ImageProducts<'a>],
     /// Contents of their adjusted kernels.
-    pub tables: &'a [&'a KernelTables],
+    pub tables: &'a [&'a AdjustedTables],
     /// Ground points of the tie points with the adjusted orientation.
     pub intersected: &'a IntersectedTies,
     /// Every pair with the adjusted orientation.

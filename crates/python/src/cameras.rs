@@ -8,7 +8,7 @@ use areograph::{
     frames::{BodyFixed, Position},
     geom::{
         ellipsoid::{Spherical, is_above_horizon, ray_meets_ellipsoid, spherical_to_xyz_m},
-        pushbroom::{ExteriorOrientation as _, Projector},
+        pushbroom::ExteriorOrientation as _,
     },
     pds::isd::SupportSource,
     stages::line_camera::LineCamera,
@@ -67,6 +67,9 @@ impl Camera {
     }
 
     /// Line, sample and whether the image shows the point, of points in degrees and metres.
+    ///
+    /// # Errors
+    /// Support data of a camera that sees no ground.
     fn project(
         &self,
         py: Python<'_>,
@@ -79,11 +82,7 @@ impl Camera {
             arrays(py, names, [longitude_deg, latitude_deg, radius_m])?;
         let camera = &self.camera.camera;
         let seen = detached(py, || -> Result<Vec<([f64; 2], bool)>> {
-            let projector = Projector::new(&camera.orientation, camera.lines());
-            let Ok(projector) = projector else {
-                return Ok(vec![UNSEEN; radii_m.len()]);
-            };
-            let projector = projector.through(camera.detector.distortion);
+            let projector = self.camera.projector()?;
             let see = |row: usize| {
                 let [longitude_rad, latitude_rad] =
                     [longitudes_deg[row], latitudes_deg[row]].map(|deg| deg * RADIANS_PER_DEGREE);

@@ -45,6 +45,22 @@ def test_ground_points_are_seen_where_the_registration_states(exact: ag.Result, 
         assert numpy.abs(sample - seen[f"{name}_sample"]).max() < 2e-4
 
 
+def test_lines_of_isis_are_those_of_its_camera_model(exact: ag.Result) -> None:
+    shots = exact.shots
+    for image in exact.images:
+        seen = shots[(shots["image"] == image) & shots["before_isis_line"].notna()]
+        assert len(seen) > 100
+        isd = json.loads(exact.path(f"exchange/centre/{image}_isd.json").read_text())
+        line, sample, valid = ag.ground_to_image(
+            isd, seen["longitude_deg"], seen["latitude_deg"], seen["ground_radius_m"]
+        )
+        assert valid.all()
+        # Pixels: both interpolate between nodes; the convention of the run, without light time, is 7 lines away.
+        assert numpy.abs(line + 0.5 - seen["before_isis_line"]).max() < 2e-3
+        assert numpy.abs(sample + 0.5 - seen["before_isis_sample"]).max() < 2e-3
+        assert numpy.abs(line - seen["before_line"]).min() > 7.0
+
+
 def test_image_to_ground_inverts_ground_to_image(mission: Mission) -> None:
     isd = mission.gusev.isd(IMAGE)
     lines, samples = isd["image_lines"], isd["image_samples"]
@@ -125,6 +141,18 @@ def test_orientation_is_that_of_cspice(mission: Mission, exact: ag.Result) -> No
 def test_other_files_are_refused(image: Any, kind: type[Exception], text: str) -> None:
     with pytest.raises(kind, match=text):
         ag.ground_to_image(image, 1.0, 2.0, 3.4e6)
+
+
+def test_a_camera_that_sees_no_ground_is_refused(mission: Mission) -> None:
+    isd = mission.gusev.isd(IMAGE)
+    # A spacecraft that stands still over a body that does not turn: no line sees a point.
+    still = json.loads(json.dumps(isd))
+    for block, key in (("instrument_position", "positions"), ("body_rotation", "quaternions")):
+        still[block][key] = [still[block][key][0]] * len(still[block][key])
+    for block, key in (("instrument_position", "velocities"), ("body_rotation", "angular_velocities")):
+        still[block][key] = [[0.0] * 3] * len(still[block][key])
+    with pytest.raises(ag.InputError, match="shows the ground"):
+        ag.ground_to_image(still, 175.0, -15.0, 3.4e6)
 
 
 def test_damaged_support_data_are_refused(mission: Mission, tmp_path: Path) -> None:

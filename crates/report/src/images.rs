@@ -145,6 +145,7 @@ fn light_time(site: &SiteProducts) -> Markup {
             );
         }
     }
+    words += " Files in exchange/centre have the convention of ISIS and ALE, centre, in every run.";
     paragraph(&words)
 }
 

@@ -1,8 +1,8 @@
 //! An orientation after a correction: samples, camera tables and line times corrected together.
 //!
 //! From these and the original kernels, `stages/tabulate_kernels` computes the states and attitudes of an SPK and a CK
-//! per image. Loaded last, they give the same orientation through the same pipeline; the flow reads them back before
-//! they get their final names.
+//! per image. Loaded last, they give the same orientation through the same pipeline, and a second pair gives it to ISIS and
+//! ALE; the flow reads them back before they get their final names.
 
 use std::sync::atomic::AtomicBool;
 
@@ -93,7 +93,7 @@ stage_inputs! {
 
 impl Stage for Reorient<'_> {
     const NAME: &'static str = "reorient";
-    const METHOD: u32 = 3;
+    const METHOD: u32 = 4;
     type Output = Orientation;
     stage_inputs!(fingerprint);
 
@@ -160,6 +160,7 @@ pub fn reorient(
         outline: GroundPoint::outline(image, camera)?,
         tables: corrected.tables(tables)?,
         light_time: orientation.light_time.clone(),
+        centre: None,
         notes: orientation.notes.clone(),
         invalid_because: orientation.invalid_because.clone(),
     })

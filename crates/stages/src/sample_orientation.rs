@@ -15,7 +15,7 @@ use self::{
 use super::{orientation::CameraReader, tag_times::ImageTimes};
 use areograph_base::{error::Result, time::Et};
 use areograph_config::{KernelsConfig, OrientationConfig, PointingConfig};
-use areograph_geom::statistics::largest;
+use areograph_geom::{light_time::LightTime, statistics::largest};
 use areograph_spice::{KernelView, Session};
 use areograph_store::{
     stage::{Output, Stage},
@@ -24,7 +24,7 @@ use areograph_store::{
 
 pub use super::orientation::{
     BoresightGround, CameraTables, GroundPoint, InterpolationCheck, LightTimeEffect, Orientation,
-    OrientationSample, OtherConvention,
+    OrientationSample, OtherConvention, SeenFromCentre,
 };
 
 /// Time between the attitude samples of the mission's C-kernels, seconds: their spacing does not explain an attitude
@@ -51,7 +51,7 @@ stage_inputs! {
 
 impl Stage for SampleOrientation<'_> {
     const NAME: &'static str = "sample_orientation";
-    const METHOD: u32 = 6;
+    const METHOD: u32 = 7;
     type Output = Orientation;
     stage_inputs!(fingerprint);
 
@@ -169,11 +169,25 @@ pub fn sample_orientation(
         body: image.body,
         samples,
         outline: GroundPoint::outline(image, |et| reader.camera(et))?,
-        tables,
         light_time: reader.effect(image)?,
+        centre: seen_from_centre(&reader, image, &tables)?,
+        tables,
         invalid_because: far.map(HeldAttitudes::reason).into_iter().collect(),
         notes: held.iter().map(ToString::to_string).collect(),
     })
+}
+
+/// The image as ISIS and ALE see it, where the convention of the run differs.
+fn seen_from_centre(
+    reader: &CameraReader<'_>,
+    image: &ImageTimes,
+    tables: &CameraTables,
+) -> Result<Option<SeenFromCentre>> {
+    if reader.light_time == LightTime::Centre {
+        return Ok(None);
+    }
+    let reader = reader.with(LightTime::Centre);
+    SeenFromCentre::of(&reader, image, tables, reader.effect(image)?).map(Some)
 }
 
 /// Makes sure, with as few readings as possible, that [`sample_orientation`] succeeds; returns the reasons why its

@@ -24,6 +24,8 @@ const FOCAL_LENGTH_MM: [f64; 2] = [0.1, 1e6];
 const PIXELS_PER_MM_MAX: f64 = 1e5;
 /// Detector coordinates.
 const DETECTOR_PX: [f64; 2] = [-1e6, 1e6];
+/// Relative tolerance of the pixel pitch, which support data state with 12 digits.
+const PITCH_TOLERANCE: f64 = 1e-9;
 /// A distortion that distinguishes x from y requires a line along one of them: sine of the angle between.
 const ALONG_AXIS: f64 = 1e-3;
 
@@ -146,11 +148,24 @@ pub(super) fn camera(
     };
     match Distortion::check(&instrument) {
         Ok(()) => Ok((instrument, turn)),
+        Err(_) if repeats_pitch(&instrument) => Err(IsdError::PitchAsDistortion {
+            pitch_mm: instrument.optics.pixel_pitch_mm.to_string(),
+        }),
         Err(folded) => Err(document.refused(
             "optical_distortion",
             format!("coefficients that keep the samples in order; with these, {folded}"),
         )),
     }
+}
+
+/// Whether the coefficients of the distortion are the pixel pitch, as ALE has them for MOC.
+fn repeats_pitch(camera: &Instrument) -> bool {
+    let DistortionModel::RadialPolynomial { coefficients } = &camera.distortion else {
+        return false;
+    };
+    let pitch_mm = camera.optics.pixel_pitch_mm;
+    let mut stated = coefficients.iter().filter(|k| k.abs() > 0.0);
+    stated.all(|k| (k - pitch_mm).abs() <= PITCH_TOLERANCE * pitch_mm)
 }
 
 /// NAIF codes of the camera and of the bus, from the chain of frames between J2000 and the camera.

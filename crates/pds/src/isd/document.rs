@@ -26,6 +26,15 @@ pub(crate) enum IsdError {
         value: String,
         expected: String,
     },
+    #[error(
+        "optical_distortion.radial.coefficients repeats the pixel pitch, {pitch_mm} mm; expected coefficients of a distortion"
+    )]
+    #[cause(
+        "configure the image by label and kernels. ALE always writes these support data for MOC, also with the period of \
+        a detector line for an image line, and with attitudes from 1.15 s after the first line. areograph writes the camera \
+        by ALE's light-time convention to exchange/centre"
+    )]
+    PitchAsDistortion { pitch_mm: String },
 }
 
 /// An object of a JSON document, and its location.

@@ -80,6 +80,9 @@ pub struct PointEntry {
     /// Whether it takes no part in an adjustment.
     #[prost(bool, optional, tag = "6")]
     pub ignore: Option<bool>,
+    /// Whether an adjustment rejected it; `jigsaw` clears this flag before the next adjustment.
+    #[prost(bool, optional, tag = "7")]
+    pub jigsaw_rejected: Option<bool>,
     /// Source of the a priori coordinates, one of [`apriori_source`].
     #[prost(int32, optional, tag = "9")]
     pub apriori_source: Option<i32>,

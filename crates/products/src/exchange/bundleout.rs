@@ -59,6 +59,8 @@ pub(super) struct ImageRow<'a> {
     pub(super) file: &'a str,
     /// Root mean square residuals of samples, lines and both.
     pub(super) rms_px: [f64; 3],
+    /// The orientation that was corrected, over the one that ISIS reads from the kernels, as `correction`.
+    pub(super) initial: [f64; ORIENTATION_UNKNOWNS],
     /// Corrections with their standard deviations before and after; metres and radians, see
     /// [`areograph_stages::adjust::CorrectedImage`].
     pub(super) correction: &'a [f64; ORIENTATION_UNKNOWNS],
@@ -233,8 +235,10 @@ fn image_fields(row: &ImageRow) -> Vec<String> {
         } else {
             ["FREE".to_owned(), of(row.sigmas[unknown])]
         };
-        let correction = of(row.correction[unknown]);
-        fields.extend([of(0.0), correction.clone(), correction, before, after]);
+        let [initial, correction] = [row.initial[unknown], row.correction[unknown]];
+        let values = [initial, correction, initial + correction].map(of);
+        fields.extend(values);
+        fields.extend([before, after]);
     }
     fields.extend(row.local_sigmas_m.map(number));
     fields.extend(row.measures.map(|count| count.to_string()));

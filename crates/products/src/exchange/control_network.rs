@@ -2,8 +2,10 @@
 //!
 //! Version 5 of the format. Coordinates are Mars-fixed metres, covariances the upper triangles of their matrices, m².
 //! Lines and samples have the middle of the first pixel at 1. Standard deviations and residuals of measurements count
-//! lines and samples of the image. A point that the adjustment rejected is included with `Ignore = True`, and its
-//! measurements with `JigsawRejected = True`.
+//! lines and samples of the image. A point that the adjustment rejected is included with
+//! `JigsawRejected = True`, and so are its measurements: `jigsaw` writes this flag and clears it before the next adjustment.
+//! `Ignore` excludes a point from all adjustments; only users set it. The format has no radii of the target: ISIS takes
+//! them from its kernels by `TargetName`.
 //!
 //! Source: `ControlNetVersioner.cpp` of ISIS.
 
@@ -195,7 +197,7 @@ fn add_point(lines: &mut Lines, point: &NetworkPoint) -> std::result::Result<(),
     lines.key("PointType", kind);
     lines.key("PointId", &quoted(point.id)?);
     if point.is_rejected {
-        lines.key("Ignore", "True");
+        lines.key("JigsawRejected", "True");
     }
     let source = if point.known.is_some() {
         "User"

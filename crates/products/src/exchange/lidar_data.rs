@@ -7,6 +7,10 @@
 //! The matrix of a point contains the shift that all points of its profile share; `sharedErrors`, a member that ISIS does not
 //! read, states it by profiles. The identifier of a point begins with its profile.
 //!
+//! Ranges are geometric. `jigsaw` computes them from its position of the spacecraft, which has the light time to the ground
+//! with the adjusted kernels for ISIS, and agrees to 0.2 m; with the original kernels it has the light time to the centre of
+//! the body, up to 330 m along the radius.
+//!
 //! ISIS (2024) takes the adjusted radius from the member `radius` when it reads such a file: the adjusted
 //! members are for other readers.
 //!

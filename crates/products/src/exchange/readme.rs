@@ -11,7 +11,6 @@ use crate::{
     site::SiteProducts,
 };
 use areograph_base::terms::Terms;
-use areograph_geom::light_time::LightTime;
 
 pub(crate) static README: Declaration = Declaration {
     path: "exchange/README.txt",
@@ -88,27 +87,27 @@ fn light_time(site: &SiteProducts) -> String {
     {
         return format!("{}.\n\n", convention(site));
     }
-    let others = match site.config.orientation.light_time {
-        LightTime::Surface | LightTime::None | LightTime::Support => {
-            format!(
-                "ISIS and ALE see the spacecraft from the centre of {} instead (LT+S), about 10 lines away. Lidar data, ground\n\
-                 control and adjusted kernels agree with ISIS and ALE only after a run with light_time = \"centre\".",
-                site.config.terms().body()
-            )
-        }
-        LightTime::Centre => {
-            "ISIS and ALE use the same convention; other programs see the ground about 10 lines away."
-                .to_owned()
-        }
-    };
-    format!(
-        "Camera models, lines and samples, ground control, lidar data and adjusted kernels follow one convention,\n{}.\n\
-         {others}\n../registration.json states the differences of the other conventions for each image.\n\
-         Ranges of lidar data are geometric in every convention: jigsaw computes ranges from the spacecraft position in ISIS\n\
-         and finds errors of up to 330 m.\n\n",
+    let body = site.config.terms().body();
+    let mut text = format!(
+        "Files in the folder centre/ have the light-time convention of ISIS and ALE in every run: positions as seen from the\n\
+         centre of {body} (LT+S). Other camera models, lines and samples, and kernels have the convention of this run,\n\
+         {}.\n\
+         With the orientation from the kernels, the two conventions see the ground about 10 lines apart. ../registration.json\n\
+         states the differences for each image; isis_line and isis_sample of ../registration.parquet are places in ISIS.\n\n",
         convention(site)
-    )
+    );
+    if site.adjustment().is_some() {
+        text += ADJUSTED;
+    }
+    text
 }
+
+/// Conventions after an adjustment.
+const ADJUSTED: &str = "\
+    Adjusted rays are the same in both conventions: points, networks, ground control, residuals and\n\
+    ../images/<image>/adjusted_isd.json suit every program, and only the adjusted kernels depend on the program that reads\n\
+    them. Ranges of lidar data are geometric: with the adjusted kernels in centre/, the ranges that jigsaw computes agree to\n\
+    0.2 m; with the original kernels they differ by up to 330 m.\n\n";
 
 /// Files written and not empty, each file of images once, and files to be written: those declared after this text.
 fn files(of: &Context) -> Vec<&'static Declaration> {
@@ -168,12 +167,13 @@ fn about(program: Program, terms: &Terms<'_>) -> String {
             Community Sensor Model (usgscsm): image support data of the cameras. These data differ from the\n\
             ALE files where the latter do not describe the camera: the time of a line includes the summing, samples\n\
             and the detector's centre count from the detector's edge, there is no distortion, and the pointing covers\n\
-            the whole image. The member areograph.interpolation states the measured interpolation error."
+            the whole image. The member areograph.interpolation states the measured interpolation error. The models\n\
+            in centre/ have the light-time convention of ISIS and ALE."
             .to_owned(),
         Program::AdjustedKernels => "\
             The adjusted site (../adjustment.json describes the adjustment and its accuracy).\n\
-            ../images/<image>/adjusted_isd.json is the adjusted camera. Load these kernels after the original kernels,\n\
-            each pair only for its image:"
+            ../images/<image>/adjusted_isd.json is the adjusted camera. ISIS and ALE load the kernels in centre/ after the\n\
+            original kernels, each pair only for its image:"
             .to_owned(),
         Program::Catalogue => "STAC".to_owned(),
     }

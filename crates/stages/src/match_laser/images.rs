@@ -1,21 +1,17 @@
 //! Image coordinates of ground points in the images of the model, by the same support data.
 
 use super::result::MatchedPoint;
-use crate::line_camera::{LineCamera, NoSight};
-use areograph_geom::{ellipsoid::spherical_to_xyz_m, pushbroom::Projector};
+use crate::line_camera::LineCamera;
+use areograph_base::error::Result;
+use areograph_geom::ellipsoid::spherical_to_xyz_m;
 
 /// Enters lines and samples into `points`, where an image shows the model's position of a point.
-pub(super) fn enter(
-    cameras: &[LineCamera],
-    points: &mut [MatchedPoint],
-) -> std::result::Result<(), NoSight> {
-    for LineCamera { camera, .. } in cameras {
-        let projector = Projector::new(&camera.orientation, camera.lines())
-            .map_err(|problem| NoSight {
-                image: camera.id.clone(),
-                problem: problem.to_string(),
-            })?
-            .through(camera.detector.distortion);
+///
+/// # Errors
+/// A camera that sees no ground.
+pub(super) fn enter(cameras: &[LineCamera], points: &mut [MatchedPoint]) -> Result<()> {
+    for of in cameras {
+        let (projector, camera) = (of.projector()?, &of.camera);
         for point in &mut *points {
             let [longitude_rad, latitude_rad, radius_m] = point.model;
             let place_m = spherical_to_xyz_m(longitude_rad, latitude_rad, radius_m);

@@ -4,6 +4,7 @@
 //! the published iterations run beside it on the same points, so that their cost and convergence are known for this
 //! site.
 
+mod isis;
 mod methods;
 mod points;
 
@@ -30,6 +31,7 @@ use areograph_store::{
     stage_inputs,
 };
 
+use isis::IsisImage;
 pub use methods::{Method, MethodRun};
 pub use points::{PointOnImage, ProfileOnImage, RegisteredPoints};
 
@@ -128,7 +130,7 @@ stage_inputs! {
 
 impl Stage for Register<'_> {
     const NAME: &'static str = "register";
-    const METHOD: u32 = 2;
+    const METHOD: u32 = 3;
     type Output = ImageRegistration;
     stage_inputs!(fingerprint);
 
@@ -178,6 +180,8 @@ pub fn register<'a>(
         .flat_map(|(profile, of)| of.rows.iter().map(move |row| (profile, *row)))
         .collect();
     let projector = camera.projector();
+    let isis = IsisImage::of(image, orientation)?;
+    let isis_projector = isis.projector();
     let mut points = RegisteredPoints::default();
     let mut rejected = BTreeMap::new();
     watch.announce(shots.len());
@@ -187,7 +191,16 @@ pub fn register<'a>(
             .par_iter()
             .map(|(_, row)| {
                 let projector = projector.as_ref().map_err(|unseen| *unseen)?;
-                camera.place(projector, &ground_m(footprints, *row))
+                let point_m = ground_m(footprints, *row);
+                let point = camera.place(projector, &point_m)?;
+                let place = isis_projector.as_ref();
+                let [isis_line, isis_sample] =
+                    place.map_or(isis::UNSEEN, |projector| isis.place(projector, &point_m));
+                Ok::<_, FootprintRejection>(PointOnImage {
+                    isis_line,
+                    isis_sample,
+                    ..point
+                })
             })
             .collect();
         for ((profile, row), placed) in block.iter().zip(placed) {
@@ -251,6 +264,8 @@ impl OrientedImage<'_> {
             line_offset: solution.x,
             y_px: focal_px.y,
             range_m: solution.camera_m.norm(),
+            isis_line: isis::UNSEEN[0],
+            isis_sample: isis::UNSEEN[1],
             residual_px: self.detector.missed_px(&focal_px),
             step_lines: solution.step_lines,
             evaluations: solution.evaluations,

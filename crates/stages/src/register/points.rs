@@ -47,6 +47,11 @@ columns! {
     line: f64,
     /// Sample coordinate: 0 at the outer edge of the first pixel, 0.5 at its centre.
     sample: f64,
+    /// Line in the delivered file as ISIS sees it, 1 at the centre of the first line; 0 where the file does not show the
+    /// point to ISIS.
+    isis_line: f64,
+    /// Its sample, in the same way.
+    isis_sample: f64,
     /// Line offset from the middle of the header image, lines.
     line_offset: f64,
     /// Across-track focal-plane coordinate from the boresight, image pixels (against the samples).

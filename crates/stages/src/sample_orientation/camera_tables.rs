@@ -1,14 +1,11 @@
 //! Tables for camera models, with as many nodes as interpolation needs.
 
-use nalgebra::{Matrix3, Vector3};
-
 use crate::orientation::CameraReader;
 use crate::{
     orientation::{CameraTables, InterpolationCheck, RayOrigin},
     tag_times::ImageTimes,
 };
 use areograph_base::{body::Body, error::Result, time::Et};
-use areograph_geom::body_rotation::spin_rad_s;
 
 /// Initial spacing of nodes of the camera-model tables, image lines; ALE's spacing for long images.
 const TABLE_LINES: u32 = 10;
@@ -101,12 +98,7 @@ fn tables(reader: &CameraReader<'_>, epochs: &[Et]) -> Result<CameraTables> {
         tables.inertial_to_mars.push(to_mars);
         tables
             .mars_angular_velocity_rad_s
-            .push(mars_angular_velocity(to_mars.matrix()));
+            .push(CameraTables::spin_rad_s(Body::Mars, to_mars.matrix()));
     }
     Ok(tables)
-}
-
-/// Spin of Mars in J2000: its rate along its pole (the pole's own motion is 1e-14 rad/s).
-fn mars_angular_velocity(inertial_to_mars: &Matrix3<f64>) -> Vector3<f64> {
-    inertial_to_mars.tr_mul(&spin_rad_s(Body::Mars.model()))
 }

@@ -43,10 +43,7 @@ impl CameraReader<'_> {
         image: &ImageTimes,
         ground: &Position<BodyFixed>,
     ) -> Result<Option<OtherConvention>> {
-        let reader = Self {
-            light_time: convention,
-            ..*self
-        };
+        let reader = self.with(convention);
         let camera = |lines: f64| -> Result<Camera> {
             reader.camera(
                 image

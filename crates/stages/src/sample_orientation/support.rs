@@ -43,6 +43,7 @@ pub(super) fn support_orientation(
             others: Vec::new(),
         },
         tables,
+        centre: None,
         invalid_because: Vec::new(),
         notes: Vec::new(),
     })

@@ -12,7 +12,7 @@ use areograph_geom::{
     ellipsoid::Spherical,
     intersection::Ray,
     oriented_camera::OrientedCamera,
-    pushbroom::{Detector, ExteriorOrientation, Pose, SampledOrientation},
+    pushbroom::{Detector, ExteriorOrientation, Pose, Projector, SampledOrientation},
 };
 use areograph_pds::isd::{ImageSupport, SupportSource};
 
@@ -30,13 +30,13 @@ pub struct LineCamera {
     pub samples: u32,
 }
 
-/// Support data that do not form an orientation.
+/// Support data that do not form an orientation, or one that sees no ground.
 #[derive(Debug, thiserror::Error, Cause)]
 #[error("image {image}: {problem}")]
 #[cause(Input: "check that the support data belong to an image that shows the ground")]
-pub(crate) struct NoSight {
-    pub(crate) image: String,
-    pub(crate) problem: String,
+struct NoSight {
+    image: String,
+    problem: String,
 }
 
 impl LineCamera {
@@ -72,6 +72,20 @@ impl LineCamera {
             (square_m2 >= 0.0).then_some([place.longitude_rad, place.latitude.0])
         });
         corners.collect()
+    }
+
+    /// Finds lines for points of the ground.
+    ///
+    /// # Errors
+    /// An orientation that sees no ground: a camera that does not move along its x axis.
+    pub fn projector(&self) -> Result<Projector<'_, SampledOrientation>> {
+        let camera = &self.camera;
+        let projector = Projector::new(&camera.orientation, camera.lines());
+        let projector = projector.map_err(|problem| NoSight {
+            image: camera.id.clone(),
+            problem: problem.to_string(),
+        })?;
+        Ok(projector.through(camera.detector.distortion))
     }
 
     /// The ray of a place, shares of lines and samples.

@@ -9,6 +9,10 @@
 //! which it was exposed. Therefore each pair is valid for its image only, not for other events at that time such as
 //! laser shots.
 //!
+//! Kernels hold geometric states, and every reader computes the camera by its own convention for light time. Therefore
+//! there are two pairs for each image ([`AdjustedTables`]): one for readers with the convention of the run, and one for
+//! ISIS and ALE. Both give the same adjusted rays; `orientation/centre.rs` has the derivation.
+//!
 //! Between two images the kernels end half way. Of two that were exposed at once, or closer in time than the tolerance
 //! with which attitude is read (CSPICE uses the last file with an attitude within it), the later one takes precedence
 //! in `adjusted.tm`; with only its own pair loaded, each is right.
@@ -35,7 +39,17 @@ use areograph_store::{
 pub use read_back::require_same;
 use tables::Source;
 
-/// Contents of an SPK and a CK for one image; empty for an image of support data, which has no original kernels.
+/// Contents of the adjusted kernels of one image, by the convention of their readers; empty for an image of support data,
+/// which has no original kernels.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct AdjustedTables {
+    /// For readers with the convention of the run.
+    pub own: KernelTables,
+    /// For ISIS and ALE, [`LightTime::Centre`].
+    pub centre: KernelTables,
+}
+
+/// Contents of an SPK and a CK for one image.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct KernelTables {
     /// Instants of the states, increasing.
@@ -77,28 +91,40 @@ stage_inputs! {
 
 impl Stage for TabulateKernels<'_> {
     const NAME: &'static str = "tabulate_kernels";
-    const METHOD: u32 = 2;
-    type Output = KernelTables;
+    const METHOD: u32 = 3;
+    type Output = AdjustedTables;
     stage_inputs!(fingerprint);
 
     fn part(&self) -> Option<String> {
         Some(self.image.to_owned())
     }
 
-    fn run(&self, _stop: &AtomicBool) -> Result<KernelTables> {
+    fn run(&self, _stop: &AtomicBool) -> Result<AdjustedTables> {
         let times = self.times.0.iter().map(Output::value);
         let times = times.collect::<Result<Vec<_>>>()?;
         if times[*self.index].support.is_some() {
-            return Ok(KernelTables::default());
+            return Ok(AdjustedTables::default());
         }
-        tabulate_kernels(
-            self.kernels.session()?,
-            &times,
-            *self.index,
-            self.orientation.value()?,
-            self.coverage,
-            self.pointing,
-        )
+        let (session, orientation) = (self.kernels.session()?, self.orientation.value()?);
+        let tabulate = |readers| {
+            let kernels = self.coverage;
+            let index = *self.index;
+            tabulate_kernels(
+                session,
+                &times,
+                index,
+                orientation,
+                readers,
+                kernels,
+                self.pointing,
+            )
+        };
+        let own = tabulate(orientation.light_time.convention)?;
+        let centre = match orientation.light_time.convention {
+            LightTime::Centre => own.clone(),
+            _ => tabulate(LightTime::Centre)?,
+        };
+        Ok(AdjustedTables { own, centre })
     }
 }
 
@@ -116,11 +142,11 @@ enum TabulateError {
     ReadBack { what: String },
 }
 
-/// States and attitudes around one of `images`, whose adjusted orientation is `orientation`.
+/// States and attitudes around one of `images`, whose adjusted orientation is `orientation`, for readers with the
+/// light-time convention `readers`.
 ///
 /// Attitudes come from samples and camera tables, positions from the original kernels plus the interpolated difference
-/// at the samples; positions are geometric, so that a user of the light-time convention of `orientation` obtains its
-/// positions. Around the image, where neither is available, the original motion continues with the difference at the
+/// at the samples; positions are geometric, so that readers with their convention obtain the positions of `orientation`. Around the image, where neither is available, the original motion continues with the difference at the
 /// end. Sampling an image with its kernels loaded reproduces its orientation within 1 mm and 1e-9 rad.
 ///
 /// # Errors
@@ -130,6 +156,7 @@ pub fn tabulate_kernels(
     images: &[&ImageTimes],
     index: usize,
     orientation: &Orientation,
+    readers: LightTime,
     kernels: &KernelsConfig,
     pointing: &PointingConfig,
 ) -> Result<KernelTables> {
@@ -137,6 +164,7 @@ pub fn tabulate_kernels(
         session: &session.of(images[index].instrument.spacecraft),
         times: images[index],
         orientation,
+        readers,
         tolerance_s: kernels.ck_tolerance_s,
         bias: pointing.bias_of(&images[index].instrument),
         attitude_span: span(images, index, kernels.padding_s),

@@ -7,7 +7,7 @@ use crate::{
 };
 use areograph_base::error::Result;
 use areograph_config::{KernelsConfig, PointingConfig};
-use areograph_geom::{attitude::rotation_vector, statistics::largest};
+use areograph_geom::{attitude::rotation_vector, light_time::LightTime, statistics::largest};
 use areograph_spice::Session;
 
 /// Tolerance for positions read back from a kernel, metres: 30 times the 3e-5 m that MGS flies in the 7e-9 s to which
@@ -17,8 +17,8 @@ const POSITION_TOLERANCE_M: f64 = 1e-3;
 /// ticks are rounded.
 const ROTATION_TOLERANCE_RAD: f64 = 1e-9;
 
-/// Makes sure that `session`, with the original kernels and the kernels of the image, gives every sample of
-/// `orientation`.
+/// Makes sure that `session`, with the original kernels and a pair of the image, gives every sample of `orientation` to
+/// readers with the light-time convention `readers`.
 ///
 /// # Errors
 /// [`Kind::Bug`](areograph_base::error::Kind::Bug) for orientations that are not reproduced within 1 mm and 1e-9 rad, and the
@@ -27,6 +27,7 @@ pub fn require_same(
     session: &Session,
     image: &ImageTimes,
     orientation: &Orientation,
+    readers: LightTime,
     kernels: &KernelsConfig,
     pointing: &PointingConfig,
 ) -> Result<()> {
@@ -37,8 +38,7 @@ pub fn require_same(
         let attitude = session.attitude(lookup, sample.et, kernels.ck_tolerance_s)?;
         let to_camera = session.mounting(&image.instrument, sample.et)? * attitude.inertial_to_bus;
         let boresight = to_camera.matrix().row(2).transpose();
-        let convention = orientation.light_time.convention;
-        let origin = RayOrigin::at(session, convention, sample.et, &boresight)?;
+        let origin = RayOrigin::at(session, readers, sample.et, &boresight)?;
         let camera_to_mars = origin.to_mars * to_camera.inverse();
         let expected = sample.pose().mars_to_camera;
         distances_m.push(origin.position().distance_m(&sample.position));

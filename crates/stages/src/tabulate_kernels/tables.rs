@@ -17,6 +17,7 @@ use areograph_geom::{
     attitude::continuous_quaternions,
     body_rotation::body_rotation,
     lagrange::lagrange,
+    light_time::LightTime,
     pushbroom::{ExteriorOrientation, Pose, SampledOrientation},
 };
 use areograph_spice::{Attitude, Session, State};
@@ -36,6 +37,8 @@ pub(super) struct Source<'a> {
     pub(super) times: &'a ImageTimes,
     /// Adjusted orientation.
     pub(super) orientation: &'a Orientation,
+    /// Light-time convention of the readers of the kernels.
+    pub(super) readers: LightTime,
     pub(super) tolerance_s: f64,
     pub(super) bias: PointingBias,
     /// The time that the CK covers.
@@ -72,9 +75,8 @@ impl Source<'_> {
 
     /// Instant and position of the spacecraft for each sample.
     fn flown(&self) -> Result<Vec<(Et, Position<J2000>)>> {
-        let light_time = self.orientation.light_time.convention;
         let samples = self.orientation.samples.iter();
-        let flown = samples.map(|sample| sample.flown(self.session, light_time));
+        let flown = samples.map(|sample| sample.flown(self.session, self.readers));
         flown.collect()
     }
 
@@ -167,13 +169,14 @@ impl Source<'_> {
             light_time,
             ..
         } = self.orientation;
+        let is_own = light_time.convention == self.readers;
         let last = tables.et_s.len().saturating_sub(1);
         let bus_to_camera = tables.bus_to_camera.matrix();
         let start_s = tables.et_s.first().copied().unwrap_or_default();
         let step_s =
             (tables.et_s.last().copied().unwrap_or_default() - start_s) / last.max(1) as f64;
         let of_sample = |sample: &OrientationSample| {
-            let to_mars = sample.mars_seen(light_time.convention);
+            let to_mars = sample.mars_seen(self.readers);
             let mars_to_camera = sample.pose().mars_to_camera;
             let at = (sample.et.seconds() - start_s) / step_s;
             Node {
@@ -182,10 +185,19 @@ impl Source<'_> {
                 rate_rad_s: lagrange(&tables.bus_angular_velocity_rad_s, at),
             }
         };
-        let of_table = |row: usize| Node {
-            exposure: Et::from_seconds(tables.et_s[row]),
-            to_bus: *tables.inertial_to_bus[row].matrix(),
-            rate_rad_s: tables.bus_angular_velocity_rad_s[row],
+        let of_table = |row: usize| {
+            let exposure = Et::from_seconds(tables.et_s[row]);
+            let mut to_bus = *tables.inertial_to_bus[row].matrix();
+            if !is_own {
+                // The same attitude to Mars, which these readers rotate to the exposure.
+                let to_mars = body_rotation(Body::Mars, exposure);
+                to_bus *= tables.inertial_to_mars[row].matrix().transpose() * to_mars.matrix();
+            }
+            Node {
+                exposure,
+                to_bus,
+                rate_rad_s: tables.bus_angular_velocity_rad_s[row],
+            }
         };
         let is_sample = |et_s: f64| {
             let mut samples = samples.iter();

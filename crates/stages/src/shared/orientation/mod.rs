@@ -1,5 +1,6 @@
 //! The exterior orientation of an image, whether sampled from kernels or corrected.
 
+mod centre;
 mod light_time;
 mod reader;
 mod support;
@@ -8,6 +9,7 @@ mod tables;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
+pub use centre::SeenFromCentre;
 pub(crate) use light_time::RayOrigin;
 pub use light_time::{LightTimeEffect, OtherConvention};
 pub(crate) use reader::CameraReader;
@@ -46,6 +48,9 @@ pub struct Orientation {
     pub tables: CameraTables,
     /// The light-time convention of all positions, and its difference from the others.
     pub light_time: LightTimeEffect,
+    /// The image as ISIS and ALE see it with the same kernels; `None` if they have the same rays: with the convention
+    /// [`LightTime::Centre`](areograph_geom::light_time::LightTime::Centre), with support data, and after an adjustment.
+    pub centre: Option<SeenFromCentre>,
     /// Notes for the reader, one sentence each.
     pub notes: Vec<String>,
     /// Reasons why the orientation is invalid; empty when it is valid.
@@ -62,6 +67,7 @@ impl Orientation {
             outline: self.outline.clone(),
             tables: self.tables.without_nodes(),
             light_time: self.light_time.clone(),
+            centre: self.centre.as_ref().map(SeenFromCentre::without_nodes),
             notes: self.notes.clone(),
             invalid_because: self.invalid_because.clone(),
             body: self.body,

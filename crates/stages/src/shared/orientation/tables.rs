@@ -5,12 +5,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::tag_times::ImageTimes;
 use areograph_base::{
+    body::Body,
     error::Result,
     frames::{BodyFixed, CameraFrame, J2000, Position, Rotation, SpacecraftBus},
     time::Et,
 };
 use areograph_geom::{
     attitude::{continuous_quaternions, matrix_of_spice_quaternion},
+    body_rotation::spin_rad_s,
     lagrange::lagrange,
     statistics::largest,
 };
@@ -57,6 +59,11 @@ pub struct InterpolationCheck {
 }
 
 impl CameraTables {
+    /// Spin of a body in J2000: its rate along its pole (the pole's own motion is 1e-14 rad/s).
+    pub(crate) fn spin_rad_s(body: Body, inertial_to_body: &Matrix3<f64>) -> Vector3<f64> {
+        inertial_to_body.tr_mul(&spin_rad_s(body.model()))
+    }
+
     /// The tables without their nodes, which occupy most of the memory of an image.
     #[must_use]
     pub fn without_nodes(&self) -> Self {
