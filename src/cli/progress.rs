@@ -2,6 +2,7 @@
 //! each stage, and lines at intervals during long stages.
 
 use std::{
+    borrow::Cow,
     fmt,
     io::{self, IsTerminal as _, Write},
     sync::{LazyLock, Mutex, PoisonError},
@@ -27,7 +28,7 @@ const TOLD_EVERY: Duration = Duration::from_secs(10);
 /// Interval at which the time on a live line is redrawn.
 const TICK: Duration = Duration::from_millis(200);
 
-/// Standard error for the log: text appears above the live lines.
+/// Standard error for the log: text appears above the live lines, one line per event.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Log;
 
@@ -41,12 +42,25 @@ impl MakeWriter<'_> for Log {
 
 impl Write for Log {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        LINES.suspend(|| io::stderr().lock().write(bytes))
+        let text = one_line(bytes);
+        LINES.suspend(|| io::stderr().lock().write_all(&text))?;
+        Ok(bytes.len())
     }
 
     fn flush(&mut self) -> io::Result<()> {
         io::stderr().lock().flush()
     }
+}
+
+/// An event as one line: programs that collect logs take every line as an event.
+fn one_line(event: &[u8]) -> Cow<'_, [u8]> {
+    let end = event.strip_suffix(b"\n").unwrap_or(event);
+    if !end.contains(&b'\n') {
+        return Cow::Borrowed(event);
+    }
+    let text = String::from_utf8_lossy(end);
+    let lines: Vec<&str> = text.lines().map(str::trim).collect();
+    Cow::Owned((lines.join("; ") + "\n").into_bytes())
 }
 
 /// Progress of a run.

@@ -630,6 +630,16 @@ fn pages_are_whole_without_a_script() {
         ),
         ("/nights", &["href=\"/nights/1\""]),
         ("/nights/1", &["Complete, with failures"]),
+        (
+            "/events",
+            &[
+                "succeeded",
+                "href=\"/jobs/1\"",
+                "href=\"/events?kind=alert\"",
+            ],
+        ),
+        ("/events?kind=run&site=alpha", &[RUN, "value=\"alpha\""]),
+        ("/events?kind=alert", &["None."]),
         ("/login", &["type=\"password\""]),
     ] {
         let answer = world.get(path);
@@ -690,6 +700,39 @@ fn a_service_that_cannot_work_says_so() {
             .contains("The changed configuration was rejected")
     );
     assert_eq!(world.get("/healthz").status, 200);
+}
+
+#[test]
+fn a_lost_kernel_is_one_line_and_its_sites_wait() {
+    let world = World::new();
+    let lost = "`mgs_sc_ext1.bc` left ck/ at 2026-03-01 01:30 UTC; put the file back";
+    world.sql(&format!(
+        "UPDATE file_version SET state = 'gone' WHERE path LIKE '%mgs_sc_ext1.bc';
+         UPDATE site_input SET blake3 = NULL;
+         UPDATE site SET problem = '{lost}', stale_because = '{lost}', stale_since_ms = 1 WHERE name IN ('alpha', 'beta')",
+    ));
+    let home = world.get("/").text();
+    assert_eq!(home.matches("left ck/ at").count(), 1, "{home}");
+    let line = between(&home, "<code>mgs_sc_ext1.bc</code> left", '\n');
+    for part in [
+        "2 sites wait for it: ",
+        "href=\"/sites/alpha\"",
+        "href=\"/sites/beta\"",
+        "The products stay those of 2026-02-28 02:30 UTC.",
+    ] {
+        assert!(line.contains(part), "no {part} in {line}");
+    }
+    let table = "waits</span> for <code>mgs_sc_ext1.bc</code>";
+    assert_eq!(home.matches(table).count(), 2, "{home}");
+    assert!(home.contains("class=\"site remarks waits\"") && home.contains("dashed frame"));
+    assert!(home.contains("Next night: "));
+    let site = world.get("/sites/alpha").text();
+    assert!(site.contains("valid with remarks; waits for mgs_sc_ext1.bc"));
+    let status = world.get("/api/v1/status").json();
+    assert_eq!(status["waits"][0]["sites"], json!(["alpha", "beta"]));
+    assert_eq!(status["next_night_utc"], "2026-03-02T01:30:00.000Z");
+    let site = world.get("/api/v1/sites/beta").json();
+    assert_eq!(site["waits_for"], "mgs_sc_ext1.bc");
 }
 
 #[test]

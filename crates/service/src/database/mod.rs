@@ -15,6 +15,7 @@ pub mod scrubs;
 pub mod service;
 pub mod shown;
 pub mod sites;
+pub mod waits;
 
 use std::{
     fs,
@@ -31,7 +32,7 @@ use areograph_base::error::{Cause, IoError, Locate as _, Result};
 use layout::{VERSION, migrate};
 
 pub use causes::{CauseKind, CauseRow, add_cause, causes};
-pub use events::{About, Event, append, events_after, newest_event};
+pub use events::{About, Event, EventFilter, append, events_after, events_before, newest_event};
 pub use jobs::{
     Enqueued, Job, JobFilter, JobRequest, Moved, Priority, WrongTransition, active_job, advance,
     due_waiting, enqueue, give_back, job, jobs, jobs_in, next_queued, pending_job, request_cancel,

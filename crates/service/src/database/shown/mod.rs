@@ -11,6 +11,7 @@ pub use super::{
     attempts::{Attempt, attempts},
     nights::{Night, night},
     runs::{Run, run},
+    waits::{Wait, waits},
 };
 pub use inputs::{KernelFile, RootFolder, kernel_by_hash, kernels, roots, used_by};
 pub use nights::nights;

@@ -23,11 +23,12 @@ pub(super) fn style() -> String {
 }
 
 /// Pages linked from every page.
-const PLACES: [(&str, &str); 4] = [
+const PLACES: [(&str, &str); 5] = [
     ("/", "Sites"),
     ("/jobs", "Jobs"),
     ("/kernels", "Kernels"),
     ("/nights", "Nights"),
+    ("/events", "Events"),
 ];
 
 /// A page: its title, and its address in the navigation.

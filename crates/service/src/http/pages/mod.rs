@@ -1,15 +1,18 @@
 //! Pages for people: complete without the script, which only keeps them up to date.
 
 mod data;
+mod events;
 mod jobs;
 mod kernels;
 pub(super) mod layout;
+mod log;
 mod login;
 mod map;
 mod nights;
 mod parts;
 mod runs;
 mod sites;
+mod standing;
 mod timeline;
 mod trend;
 
@@ -44,6 +47,7 @@ pub(super) fn routes() -> Router<Arc<App>> {
         .route("/jobs/{job}/cancel", post(jobs::cancel_one))
         .route("/jobs/{job}/retry", post(jobs::retry_one))
         .route("/kernels", get(kernels::list))
+        .route("/events", get(events::list))
         .route("/nights", get(nights::list))
         .route("/nights/{night}", get(nights::one))
         .route("/login", get(login::form).post(login::enter))
