@@ -2,6 +2,7 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+mod service_check;
 mod service_commands;
 mod service_data;
 mod service_fetch;
