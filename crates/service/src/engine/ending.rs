@@ -103,7 +103,7 @@ pub fn finish<W: Workers>(
         };
         let said = moved.outcome.as_ref().map(outcome_text).unwrap_or_default();
         go(transaction, now_ms, &job, state, &moved)?;
-        let text = format!("job {} is {state}: {said}", job.id);
+        let text = format!("{state}: {said}");
         let alerted = match standing(state) {
             None => false,
             Some(standing) => {
@@ -113,7 +113,7 @@ pub fn finish<W: Workers>(
         // An alert is in the log already.
         if !alerted {
             let (site, attempt) = (&attempt.site, attempt.n);
-            tracing::info!(site, attempt, "{text}");
+            tracing::info!(site, job = job.id, attempt, "{text}");
         }
         fresh::refresh(transaction, now_ms, Some(&attempt.site))?;
         Ok(true)

@@ -13,7 +13,10 @@ use serde_json::Value;
 use super::{
     jobs::short,
     layout::{Page, form_token, operator},
-    parts::{Times, figure, figure_name, lead, prose, said, sentences, size, table, times, tone},
+    parts::{
+        Times, figure, figure_name, lead, log_rows, prose, said, sentences, size, table, times,
+        tone,
+    },
     trend::{KernelChange, figures, headline},
 };
 use crate::{
@@ -187,7 +190,7 @@ fn kernel_table(run: &Run, before: Option<&Run>) -> Markup {
     };
     html! {
         @if let Some(words) = change.as_ref().and_then(KernelChange::words) { p { "Since the previous run: " (words) "." } }
-        (table("Kernels in load order", &["Kernel", "Role", "BLAKE3", "Since the previous run"], &html! {
+        (log_rows("Kernels in load order", &["Kernel", "Role", "BLAKE3", "Since the previous run"], &html! {
             @for kernel in kernels {
                 @let name = text(kernel, "name");
                 tr {
@@ -211,7 +214,7 @@ fn stage_table(run: &Run) -> Markup {
             .to_owned()
     };
     html! {
-        (table("Stages", &["Stage", "Ran", "Why"], &html! {
+        (log_rows("Stages", &["Stage", "Ran", "Why"], &html! {
             @for stage in stages {
                 tr {
                     th scope="row" { (text(stage, "stage")) }
@@ -226,7 +229,7 @@ fn stage_table(run: &Run) -> Markup {
 fn file_table(run: &Run, manifest: &Manifest) -> Markup {
     html! {
         p { a href={ "/api/v1/runs/" (run.id) "/files/" (MANIFEST) } { (MANIFEST) } ": all inputs of these products." }
-        (table("Products", &["File", "Size", "Rows", "BLAKE3"], &html! {
+        (log_rows("Products", &["File", "Size", "Rows", "BLAKE3"], &html! {
             @for product in &manifest.products {
                 tr {
                     th scope="row" { a href={ "/api/v1/runs/" (run.id) "/files/" (product.path) } { (product.path) } }
