@@ -10,6 +10,7 @@ mod service_http;
 mod service_http_data;
 mod service_http_hostile;
 mod service_http_many;
+mod service_monitoring;
 mod service_run;
 mod worker;
 mod world;

@@ -7,6 +7,7 @@ mod jobs;
 mod kernels;
 mod life;
 mod logs;
+mod measures;
 mod new_jobs;
 mod nights;
 mod plans;
@@ -98,5 +99,5 @@ fn described() -> OpenApiRouter<Arc<App>> {
         .routes(routes!(status::status))
         .routes(routes!(life::healthy))
         .routes(routes!(life::ready))
-        .routes(routes!(life::metrics))
+        .routes(routes!(measures::metrics))
 }

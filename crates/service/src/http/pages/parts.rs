@@ -63,7 +63,7 @@ impl Times {
 }
 
 /// CSS class of a verdict's colour.
-pub(super) fn tone(verdict: Option<&str>) -> &'static str {
+pub(in crate::http) fn tone(verdict: Option<&str>) -> &'static str {
     match verdict {
         Some("valid") => "valid",
         Some(verdict) if verdict.starts_with("valid") => "remarks",
