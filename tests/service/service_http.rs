@@ -640,6 +640,15 @@ fn pages_are_whole_without_a_script() {
         ),
         ("/events?kind=run&site=alpha", &[RUN, "value=\"alpha\""]),
         ("/events?kind=alert", &["None."]),
+        (
+            "/docs",
+            &[
+                "GET /api/v1/sites/{site}",
+                "href=\"#document-Status\"",
+                "id=\"document-Status\"",
+                "href=\"/openapi.json\"",
+            ],
+        ),
         ("/login", &["type=\"password\""]),
     ] {
         let answer = world.get(path);
@@ -665,6 +674,19 @@ fn pages_are_whole_without_a_script() {
             policy.starts_with("default-src 'none'") && !policy.contains("unsafe"),
             "{policy}"
         );
+    }
+    let docs = world.get("/docs").text();
+    let described = world.get("/openapi.json").json();
+    for (path, item) in described["paths"].as_object().unwrap() {
+        for method in item
+            .as_object()
+            .unwrap()
+            .keys()
+            .filter(|key| *key != "parameters")
+        {
+            let operation = format!("<code>{} {path}</code>", method.to_uppercase());
+            assert!(docs.contains(&operation), "no {operation}");
+        }
     }
     let missing = world.get("/nothing");
     assert_eq!(

@@ -65,7 +65,7 @@ impl Page<'_> {
             footer {
                 "areograph " (env!("CARGO_PKG_VERSION")) ", " (name) ". Times are UTC"
                 @if config.schedule.zone != "UTC" { ", then " (config.schedule.zone) }
-                ". " a href="/openapi.json" { "Interface for programs" }
+                ". " a href="/docs" { "Interface for programs" }
                 span id="live" role="status" {}
             }
         }

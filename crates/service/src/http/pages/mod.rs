@@ -1,6 +1,7 @@
 //! Pages for people: complete without the script, which only keeps them up to date.
 
 mod data;
+mod docs;
 mod events;
 mod jobs;
 mod kernels;
@@ -49,6 +50,7 @@ pub(super) fn routes() -> Router<Arc<App>> {
         .route("/jobs/{job}/retry", post(jobs::retry_one))
         .route("/kernels", get(kernels::list))
         .route("/events", get(events::list))
+        .route("/docs", get(docs::docs))
         .route("/nights", get(nights::list))
         .route("/nights/{night}", get(nights::one))
         .route("/login", get(login::form).post(login::enter))
