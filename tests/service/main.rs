@@ -12,5 +12,6 @@ mod service_http_hostile;
 mod service_http_many;
 mod service_monitoring;
 mod service_run;
+mod service_upgrade;
 mod worker;
 mod world;

@@ -101,13 +101,15 @@ pub fn check(config: &ServiceConfig, now_ms: i64) -> Vec<Finding> {
         let least_mib = u64::from(config.workers.min_free_mib);
         let room = free_mib(&above(folder)).map_or_else(
             || Ok("the system does not report the free space".to_owned()),
-            |left_mib| match left_mib < least_mib {
-                true => Err(Fault::NoRoom {
-                    left_mib,
-                    least_mib,
-                })
-                .in_file(folder),
-                false => Ok(format!("{left_mib} MiB free")),
+            |left_mib| {
+                if left_mib < least_mib {
+                    let fault = Fault::NoRoom {
+                        left_mib,
+                        least_mib,
+                    };
+                    return Err(fault).in_file(folder);
+                }
+                Ok(format!("{left_mib} MiB free"))
             },
         );
         note("disk", &folder.display(), false, room);
@@ -158,23 +160,25 @@ fn writable(folder: &Path) -> Result<String> {
     if access(&existing, Access::WRITE_OK | Access::EXEC_OK).is_err() {
         return Err(Fault::NotWritable).in_file(existing);
     }
-    Ok(match existing == folder {
-        true => "writable".to_owned(),
-        false => "does not exist yet: the first start creates it".to_owned(),
-    })
+    let text = if existing == folder {
+        "writable"
+    } else {
+        "does not exist yet: the first start creates it"
+    };
+    Ok(text.to_owned())
 }
 
 /// A folder of inputs, and whether its fault stops a service. One that was available before may be away.
 fn input_folder(folder: &Folder, is_known: bool, file: &Path) -> (bool, Result<String>) {
     let path = Path::new(&folder.path);
     if !path.is_dir() {
-        return match is_known {
-            true => (
+        if is_known {
+            return (
                 false,
                 Ok("away: its sites wait until it is back".to_owned()),
-            ),
-            false => (true, Err(never_seen(folder)).in_file(file)),
-        };
+            );
+        }
+        return (true, Err(never_seen(folder)).in_file(file));
     }
     let listed = fs::read_dir(path)
         .map_err(IoError::on("list the folder"))

@@ -123,20 +123,16 @@ fn print(findings: &[Finding], starts: bool) {
         ..
     } in findings
     {
-        match found {
-            Ok(text) if text.is_empty() => {
-                output::line(format_args!("ok     {subject:13}  {place}"))
-            }
-            Ok(text) => output::line(format_args!("ok     {subject:13}  {place}: {text}")),
-            Err(_) => output::line(format_args!("FAULT  {subject:13}  {place}")),
-        }
+        output::line(match found {
+            Ok(text) if text.is_empty() => format!("ok     {subject:13}  {place}"),
+            Ok(text) => format!("ok     {subject:13}  {place}: {text}"),
+            Err(_) => format!("FAULT  {subject:13}  {place}"),
+        });
     }
     let faults = findings.iter().filter(|finding| finding.found.is_err());
     let faults = counted(faults.count(), "fault");
-    output::line(match starts {
-        true => format!("the service would start; {faults}"),
-        false => format!("the service would NOT start; {faults}"),
-    });
+    let not = if starts { "" } else { "NOT " };
+    output::line(format_args!("the service would {not}start; {faults}"));
 }
 
 /// The site files, each with its kernels.

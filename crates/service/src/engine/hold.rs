@@ -81,9 +81,10 @@ pub fn not_ready(connection: &Connection) -> Stored<NotReady> {
         }
     }
     for wait in waits(connection)? {
-        let known = match wait.is_lost() {
-            true => &mut found.lost,
-            false => &mut found.by_site,
+        let known = if wait.is_lost() {
+            &mut found.lost
+        } else {
+            &mut found.by_site
         };
         for site in wait.sites {
             known.entry(site).or_insert_with(|| wait.text.clone());

@@ -67,7 +67,7 @@ pub(super) fn routes() -> Router<Arc<App>> {
     )
 }
 
-/// The description of all routes for programs, as OpenAPI.
+/// The description of all routes for programs, as `OpenAPI`.
 pub(super) fn description() -> &'static Value {
     static DESCRIPTION: LazyLock<Value> = LazyLock::new(|| {
         let (_, mut description) = described().split_for_parts();

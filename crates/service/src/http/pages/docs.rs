@@ -24,7 +24,7 @@ pub(super) async fn docs(
 ) -> Result<Response, Problem> {
     let description = description();
     let body = html! {
-        p { (text(&description["info"]["description"])) }
+        p { (prose(text(&description["info"]["description"]))) }
         p {
             "The same as a document for programs: " a href="/openapi.json" { "openapi.json" } " (OpenAPI "
             (text(&description["openapi"])) "). A token is sent as " code { "Authorization: Bearer areo_…" }
@@ -66,7 +66,7 @@ fn one(path: &str, method: &str, operation: &Value) -> Markup {
     let bodies = entries(&operation["requestBody"]["content"]);
     html! {
         details {
-            summary { code { (method.to_uppercase()) " " (path) } " " (text(&operation["summary"])) }
+            summary { code { (method.to_uppercase()) " " (path) } " " (prose(text(&operation["summary"]))) }
             @if !text(&operation["description"]).is_empty() { p { (prose(text(&operation["description"]))) } }
             @if items(&operation["parameters"]).next().is_some() {
                 (table("Parameters", &["Name", "In", "Type", "Required", "Meaning"], &html! {
@@ -108,7 +108,7 @@ fn document(name: &str, schema: &Value) -> Markup {
     };
     html! {
         details id={ "document-" (name) } {
-            summary { code { (name) } " " (text(&schema["description"])) }
+            summary { code { (name) } " " (prose(text(&schema["description"]))) }
             @for part in &parts { @if part.get("$ref").is_some() { p { "Contains the entries of " (kind(part)) "." } } }
             @if items(&schema["enum"]).next().is_some() {
                 p { "One of " @for (k, word) in items(&schema["enum"]).enumerate() { @if k > 0 { ", " } code { (text(word)) } } "." }

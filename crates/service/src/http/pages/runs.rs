@@ -104,8 +104,11 @@ fn run_lead(run: &Run, causes: &[CauseRow], manifest: Option<&Manifest>, times: 
             }
             @if run.damaged > 0 { p { "Products withheld because they do not match the manifest: " (run.damaged) "." } }
             (said(&sentences(&run.reasons)))
-            @for because in sentences(&run.because) { p { "Because: " (prose(&because)) } }
-        @for cause in causes { @if !cause.detail.is_empty() { p { "Because: " (prose(&cause.detail)) } } }
+            @let because = sentences(&run.because);
+            @for because in &because { p { "Because: " (prose(because)) } }
+            @for cause in causes.iter().filter(|cause| !cause.detail.is_empty() && !because.contains(&cause.detail)) {
+                p { "Because: " (prose(&cause.detail)) }
+            }
             @if named(REPORT) { p { a href={ "/api/v1/runs/" (run.id) "/files/" (REPORT) } { "Report" } } }
         },
     )
