@@ -1,7 +1,6 @@
 //! `areograph serve`.
 
 use std::{
-    fs,
     net::SocketAddr,
     path::{Path, PathBuf},
     process::ExitCode,
@@ -22,7 +21,7 @@ use super::{output, panicked::flatten, report};
 use crate::{
     config::{Document as _, ServiceConfig},
     error::{Cause, Error, IoError, Locate as _},
-    scene::{SceneOptions, write_scene},
+    scene::{SceneOptions, write_later_orbit, write_scene},
     service::{
         clock::Clock,
         engine::{Engine, workers::Processes},
@@ -36,10 +35,6 @@ use crate::{
 
 /// Name of the configuration that `--init` writes.
 const FILE: &str = "areograph.toml";
-/// Folder of kernels that `--init` does not put into force, the kernel in it, and the one with its content.
-const UPDATES: &str = "updates";
-const UPDATED: &str = "mgs_nav_scene.bsp";
-const BETTER: &str = "mgs_gsfc_scene.bsp";
 /// Maximum time of a graceful shutdown.
 const END_WITHIN: Duration = Duration::from_secs(25);
 
@@ -88,28 +83,17 @@ fn init(folder: &Path) -> Result<(), Error> {
     }
     write_scene(folder, &SceneOptions::default())?;
     atomic::write(&path, demonstration().as_bytes())?;
-    update(folder)?;
+    let [later, used] = write_later_orbit(folder)?;
     let (folder, path) = (folder.display(), path.display());
     output::line(format_args!(
         "{folder}: a synthetic mission and a configuration; next:\n\
          \x20 areograph serve {path}\n\
-         and, once its sites have run, a new orbit to see what moves:\n\
-         \x20 cp {folder}/{UPDATES}/{UPDATED} {folder}/kernels/{UPDATED}"
+         and, once its sites have run, a later orbit to see what moves:\n\
+         \x20 cp {} {}",
+        later.display(),
+        used.display()
     ));
     Ok(())
-}
-
-/// A later version of the orbit `nav`, beside the mission: of its rivals, `gsfc` is the true orbit.
-fn update(folder: &Path) -> Result<(), Error> {
-    let (kernels, updates) = (folder.join("kernels"), folder.join(UPDATES));
-    let better = kernels.join(BETTER);
-    let orbit = fs::read(&better)
-        .map_err(IoError::on("read"))
-        .in_file(better)?;
-    fs::create_dir_all(&updates)
-        .map_err(IoError::on("create the folder"))
-        .in_file(&updates)?;
-    atomic::write(&updates.join(UPDATED), &orbit)
 }
 
 /// The example, with short intervals for a demonstration.

@@ -573,84 +573,87 @@ fn behind_a_proxy_cookies_are_for_this_host_alone_and_nothing_is_open() {
     assert_eq!(page.status, 200);
 }
 
+/// Pages, and parts of each.
+const PAGES: &[(&str, &[&str])] = &[
+    (
+        "/",
+        &[
+            "<h1>Sites</h1>",
+            "Stale since",
+            "<svg",
+            "href=\"/sites/alpha\"",
+            "Night of",
+            "03:30 CET",
+        ],
+    ),
+    (
+        "/sites/alpha",
+        &[
+            "valid with remarks",
+            "range mean, m",
+            "<svg",
+            "mgs_sc_ext1.bc changed",
+            RUN,
+        ],
+    ),
+    (
+        "/sites/gamma",
+        &["is not valid and did not become current", "limit 50 m"],
+    ),
+    ("/jobs", &["crashes at stage register", "href=\"/jobs/4\""]),
+    ("/jobs?state=running", &["beta"]),
+    (
+        "/jobs/4",
+        &[
+            "its coverage overlaps image E02-01453",
+            "7 of 20",
+            "&lt;script&gt;alert(1)",
+            "<progress",
+        ],
+    ),
+    ("/jobs/7", &["signal 11"]),
+    (
+        "/runs/20260301_010000_j2_a1",
+        &[
+            "Footprints moved by at most 31 m",
+            "tables/footprints.csv",
+            "changed",
+            BEFORE,
+        ],
+    ),
+    (
+        "/kernels",
+        &["ck/mgs_sc_ext1.bc", "with 1 gap", "href=\"/sites/beta\""],
+    ),
+    ("/nights", &["href=\"/nights/1\""]),
+    ("/nights/1", &["Complete, with failures"]),
+    (
+        "/events",
+        &[
+            "succeeded",
+            "href=\"/jobs/1\"",
+            "href=\"/events?kind=alert\"",
+        ],
+    ),
+    ("/events?kind=run&site=alpha", &[RUN, "value=\"alpha\""]),
+    ("/events?kind=alert", &["None."]),
+    (
+        "/docs",
+        &[
+            "GET /api/v1/sites/{site}",
+            "href=\"#document-Status\"",
+            "id=\"document-Status\"",
+            "href=\"/openapi.json\"",
+        ],
+    ),
+    ("/login", &["type=\"password\""]),
+];
+
 #[test]
 fn pages_are_whole_without_a_script() {
     let world = World::new();
     let secret = world.folder.path().display().to_string();
-    for (path, expected) in [
-        (
-            "/",
-            &[
-                "<h1>Sites</h1>",
-                "Stale since",
-                "<svg",
-                "href=\"/sites/alpha\"",
-                "Night of",
-                "03:30 CET",
-            ][..],
-        ),
-        (
-            "/sites/alpha",
-            &[
-                "valid with remarks",
-                "range mean, m",
-                "<svg",
-                "mgs_sc_ext1.bc changed",
-                RUN,
-            ],
-        ),
-        (
-            "/sites/gamma",
-            &["is not valid and did not become current", "limit 50 m"],
-        ),
-        ("/jobs", &["crashes at stage register", "href=\"/jobs/4\""]),
-        ("/jobs?state=running", &["beta"]),
-        (
-            "/jobs/4",
-            &[
-                "its coverage overlaps image E02-01453",
-                "7 of 20",
-                "&lt;script&gt;alert(1)",
-                "<progress",
-            ],
-        ),
-        ("/jobs/7", &["signal 11"]),
-        (
-            &*format!("/runs/{RUN}"),
-            &[
-                "Footprints moved by at most 31 m",
-                "tables/footprints.csv",
-                "changed",
-                BEFORE,
-            ],
-        ),
-        (
-            "/kernels",
-            &["ck/mgs_sc_ext1.bc", "with 1 gap", "href=\"/sites/beta\""],
-        ),
-        ("/nights", &["href=\"/nights/1\""]),
-        ("/nights/1", &["Complete, with failures"]),
-        (
-            "/events",
-            &[
-                "succeeded",
-                "href=\"/jobs/1\"",
-                "href=\"/events?kind=alert\"",
-            ],
-        ),
-        ("/events?kind=run&site=alpha", &[RUN, "value=\"alpha\""]),
-        ("/events?kind=alert", &["None."]),
-        (
-            "/docs",
-            &[
-                "GET /api/v1/sites/{site}",
-                "href=\"#document-Status\"",
-                "id=\"document-Status\"",
-                "href=\"/openapi.json\"",
-            ],
-        ),
-        ("/login", &["type=\"password\""]),
-    ] {
+    for (path, expected) in PAGES {
         let answer = world.get(path);
         let text = answer.text();
         assert_eq!(answer.status, 200, "{path}: {text}");
@@ -658,7 +661,7 @@ fn pages_are_whole_without_a_script() {
             answer.header("content-type"),
             Some("text/html; charset=utf-8")
         );
-        for part in expected {
+        for part in *expected {
             assert!(text.contains(part), "{path}: no {part} in {text}");
         }
         assert!(
@@ -675,6 +678,21 @@ fn pages_are_whole_without_a_script() {
             "{policy}"
         );
     }
+    let missing = world.get("/nothing");
+    assert_eq!(
+        (missing.status, missing.header("content-type")),
+        (404, Some("text/html; charset=utf-8"))
+    );
+    let style = between(&world.get("/").text(), "rel=\"stylesheet\" href=\"", '"');
+    assert_eq!(
+        world.get(&style).header("content-type"),
+        Some("text/css; charset=utf-8")
+    );
+}
+
+#[test]
+fn the_page_of_the_interface_names_every_operation() {
+    let world = World::new();
     let docs = world.get("/docs").text();
     let described = world.get("/openapi.json").json();
     for (path, item) in described["paths"].as_object().unwrap() {
@@ -688,16 +706,6 @@ fn pages_are_whole_without_a_script() {
             assert!(docs.contains(&operation), "no {operation}");
         }
     }
-    let missing = world.get("/nothing");
-    assert_eq!(
-        (missing.status, missing.header("content-type")),
-        (404, Some("text/html; charset=utf-8"))
-    );
-    let style = between(&world.get("/").text(), "rel=\"stylesheet\" href=\"", '"');
-    assert_eq!(
-        world.get(&style).header("content-type"),
-        Some("text/css; charset=utf-8")
-    );
 }
 
 #[test]

@@ -19,7 +19,6 @@ use tokio_util::task::TaskTracker;
 use super::{
     adopt::adopt,
     agenda::{Agenda, lock, patience_ms},
-    alerts::tell_waits,
     attempt::{AtWork, follow, take},
     core::Core,
     diffs::compare_all,
@@ -319,7 +318,6 @@ impl<W: Workers> Engine<W> {
         let config = self.core.shared.config();
         self.core.shared.write(|transaction| {
             beat(transaction, now_ms)?;
-            tell_waits(transaction, &config, now_ms)?;
             tell_stale(transaction, &config, now_ms)
         })?;
         {
