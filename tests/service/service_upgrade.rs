@@ -299,3 +299,40 @@ fn files_of_an_earlier_version_are_kept_named_and_made_again_once() {
         [format!("{EARLIER} 1"), format!("{PRESENT} 1")]
     );
 }
+
+#[test]
+fn a_copy_in_another_folder_continues_without_a_run() {
+    let service = Service::new();
+    let copy = service.folder.path().join("copy.db");
+    let mut backup = areograph();
+    backup
+        .args(["service", "backup"])
+        .arg(service.path("areograph.toml"));
+    succeed(backup.arg(&copy));
+    let current = fs::read_link(service.path("products/isidis/current")).unwrap();
+    // As the guide states: the folder without `state`, and the copy of the database in its place.
+    let elsewhere = tempfile::tempdir().unwrap();
+    let place = elsewhere.path().join("demo");
+    let mut copied = std::process::Command::new("cp");
+    succeed(copied.arg("-a").arg(service.path("")).arg(&place));
+    fs::remove_dir_all(place.join("state")).unwrap();
+    fs::create_dir(place.join("state")).unwrap();
+    fs::copy(&copy, place.join("state/areograph.db")).unwrap();
+    // Nothing of the first machine can be reached.
+    drop(service);
+    let other = Service { folder: elsewhere };
+    assert_eq!(
+        said(&other.nightly()),
+        "1 site compared, 0 runs, 0 failures\n"
+    );
+    assert_eq!(
+        fs::read_link(other.path("products/isidis/current")).unwrap(),
+        current
+    );
+    let nights = "SELECT CAST(count(*) AS TEXT) FROM night WHERE ended_ms IS NOT NULL";
+    assert_eq!(
+        other.ask("areograph.db", nights),
+        ["2"],
+        "the history goes on"
+    );
+}
