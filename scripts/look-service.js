@@ -7,7 +7,7 @@ const [chromiumPath, pictures, address, token] = process.argv.slice(2);
 const axe = fs.readFileSync(require.resolve('axe-core/axe.min.js'), 'utf8');
 const widths = [['phone', 360], ['tablet', 800], ['desktop', 1440]];
 const pages = [['sites', '/'], ['site', '/sites/alpha'], ['site-not-valid', '/sites/gamma'], ['jobs', '/jobs'], ['job', '/jobs/4'],
-  ['run', '/runs/20260301_010000_j2_a1'], ['kernels', '/kernels'], ['nights', '/nights'], ['night', '/nights/1'],
+  ['run', '/runs/20260301_010000_j2_a1'], ['kernels', '/kernels'], ['nights', '/nights'], ['events', '/events'], ['docs', '/docs'], ['night', '/nights/1'],
   ['login', '/login'], ['missing', '/nothing']];
 let failed = false;
 

@@ -111,7 +111,7 @@ enum Command {
     Scene(scene::Arguments),
     Serve(serve::Arguments),
     Nightly(nightly::Arguments),
-    /// Maintains a service: copies of its database, its tokens.
+    /// Maintains a service: its configuration, copies of its database, its tokens.
     #[command(after_help = "Example: areograph service token list areograph.toml")]
     Service(service::Arguments),
     Completions(completions::Arguments),

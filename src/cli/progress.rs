@@ -2,6 +2,7 @@
 //! elsewhere lines at intervals.
 
 use std::{
+    borrow::Cow,
     fmt,
     io::{self, IsTerminal as _, Write},
     sync::{
@@ -36,7 +37,7 @@ const TIME_FROM_S: f64 = 2.0;
 /// Interval at which the time on a live line is redrawn.
 const TICK: Duration = Duration::from_millis(200);
 
-/// Standard error for the log: text appears above the live lines.
+/// Standard error for the log: text appears above the live lines, one line per event.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Log;
 
@@ -50,12 +51,25 @@ impl MakeWriter<'_> for Log {
 
 impl Write for Log {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        LINES.suspend(|| io::stderr().lock().write(bytes))
+        let text = one_line(bytes);
+        LINES.suspend(|| io::stderr().lock().write_all(&text))?;
+        Ok(bytes.len())
     }
 
     fn flush(&mut self) -> io::Result<()> {
         io::stderr().lock().flush()
     }
+}
+
+/// An event as one line: programs that collect logs take every line as an event.
+fn one_line(event: &[u8]) -> Cow<'_, [u8]> {
+    let end = event.strip_suffix(b"\n").unwrap_or(event);
+    if !end.contains(&b'\n') {
+        return Cow::Borrowed(event);
+    }
+    let text = String::from_utf8_lossy(end);
+    let lines: Vec<&str> = text.lines().map(str::trim).collect();
+    Cow::Owned((lines.join("; ") + "\n").into_bytes())
 }
 
 /// Progress of a run, or of another command that takes time.

@@ -21,7 +21,7 @@ use super::{output, panicked::flatten, report};
 use crate::{
     config::{Document as _, ServiceConfig},
     error::{Cause, Error, IoError, Locate as _},
-    scene::{SceneOptions, write_scene},
+    scene::{SceneOptions, write_later_orbit, write_scene},
     service::{
         clock::Clock,
         engine::{Engine, workers::Processes},
@@ -80,10 +80,15 @@ fn init(folder: &Path) -> Result<(), Error> {
     }
     write_scene(folder, &SceneOptions::default())?;
     atomic::write(&path, demonstration().as_bytes())?;
+    let [later, used] = write_later_orbit(folder)?;
+    let (folder, path) = (folder.display(), path.display());
     output::line(format_args!(
-        "{}: a synthetic mission and a configuration; next: areograph serve {}",
-        folder.display(),
-        path.display()
+        "{folder}: a synthetic mission and a configuration; next:\n\
+         \x20 areograph serve {path}\n\
+         and, once its sites have run, a later orbit to see what moves:\n\
+         \x20 cp {} {}",
+        later.display(),
+        used.display()
     ));
     Ok(())
 }

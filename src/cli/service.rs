@@ -1,5 +1,8 @@
 //! `areograph service`: maintenance of a service.
 
+mod check;
+mod init;
+
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
@@ -20,7 +23,7 @@ use crate::{
 
 const DAY_MS: i64 = 86_400_000;
 
-/// Maintains a service: copies of its database, its tokens.
+/// Maintains a service: its configuration, copies of its database, its tokens.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     #[command(subcommand)]
@@ -29,6 +32,8 @@ pub(super) struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Init(init::Arguments),
+    Check(check::Arguments),
     /// Copy the database, also while the service runs.
     #[command(after_help = "Example: areograph service backup areograph.toml copy.sqlite")]
     Backup {
@@ -108,6 +113,8 @@ enum Unfit {
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     match &arguments.command {
+        Command::Init(arguments) => init::run(arguments),
+        Command::Check(arguments) => check::run(arguments),
         Command::Backup { config, file } => {
             if file.symlink_metadata().is_ok() {
                 return Err(Unfit::FileExists).in_file(file);

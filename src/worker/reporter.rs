@@ -88,6 +88,7 @@ impl Observer for Reporter {
             StageEvent::Kept => self.stage(stage, "kept", "unchanged", 0.0),
             StageEvent::Done(seconds) => {
                 self.stage(stage, "done", "", *seconds);
+                tracing::info!(stage, seconds, "done");
                 // A short run would end between two heartbeats, and its memory would not be known.
                 self.beat();
             }

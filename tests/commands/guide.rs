@@ -27,7 +27,7 @@ const WORDS: [(&str, usize); 3] = [
 ];
 
 /// Starts of commands that other tests run, with what runs them.
-const ELSEWHERE: [(&str, &str); 15] = [
+const ELSEWHERE: [(&str, &str); 18] = [
     ("scripts/", "continuous integration"),
     ("cargo run", "compiled as an example with the tests"),
     (
@@ -38,6 +38,15 @@ const ELSEWHERE: [(&str, &str); 15] = [
     (
         "areograph serve service-demo/areograph.toml ",
         "tests/service",
+    ),
+    (
+        "areograph service check mars/",
+        "tests/service/service_check.rs, with a port of its own",
+    ),
+    ("areograph serve mars/", "tests/service/service_check.rs"),
+    (
+        "cp service-demo/updates/",
+        "tests/service/service_run.rs, after the sites have run",
     ),
     ("areograph pedr sql", "tests/sql, with its feature"),
     (

@@ -2,6 +2,7 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+mod service_check;
 mod service_commands;
 mod service_data;
 mod service_fetch;
@@ -9,6 +10,8 @@ mod service_http;
 mod service_http_data;
 mod service_http_hostile;
 mod service_http_many;
+mod service_monitoring;
 mod service_run;
+mod service_upgrade;
 mod worker;
 mod world;

@@ -6,6 +6,8 @@
     reason = "helpers of tests may fail loudly"
 )]
 
+use areograph::config::{Document as _, ServiceConfig};
+
 use crate::common;
 
 use std::{
@@ -231,4 +233,74 @@ fn units_of_systemd_are_sound() {
         .unwrap();
     // 4.0 of 10: what is left is the network, for the pages.
     assert!(exposed.status.success(), "{}", said(&exposed));
+}
+
+/// The value of a setting of a unit.
+fn setting<'a>(unit: &'a str, name: &str) -> Option<&'a str> {
+    let start = format!("{name}=");
+    unit.lines().find_map(|line| line.strip_prefix(&start))
+}
+
+/// The text between two marks.
+fn between<'a>(text: &'a str, before: &str, after: &str) -> &'a str {
+    let (_, rest) = text.split_once(before).unwrap();
+    rest.split_once(after).unwrap().0
+}
+
+#[test]
+fn the_packaged_configuration_names_folders_that_the_units_let_it_write() {
+    let checkout = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let read = |name: &str| fs::read_to_string(checkout.join(name)).unwrap();
+    let (script, example) = (read("scripts/deb"), read("config/areograph.toml"));
+    // The configuration as the script of the package makes it.
+    let state = between(&script, "\nstate=", "\n");
+    let edit = between(&script, "\nsed -E \"", "\" config/areograph.toml").replace("$state", state);
+    let made = Command::new("sed")
+        .args(["-E", &edit])
+        .arg(checkout.join("config/areograph.toml"))
+        .output()
+        .unwrap();
+    let packaged = String::from_utf8(made.stdout).unwrap();
+    assert_ne!(packaged, example);
+    let file = Path::new("/etc/areograph/areograph.toml");
+    let config = ServiceConfig::parse(&packaged, file).unwrap().config;
+    let inputs = [
+        &config.inputs.sites,
+        &config.inputs.kernels,
+        &config.inputs.data,
+    ];
+    let inputs: Vec<&PathBuf> = inputs.into_iter().flatten().collect();
+    let written = [
+        &config.outputs.products,
+        &config.outputs.state,
+        &config.fetch.folder,
+    ];
+    for unit in ["areograph.service", "areograph-nightly.service"] {
+        let unit = read(&format!("config/systemd/{unit}"));
+        let writable = setting(&unit, "ReadWritePaths").unwrap();
+        assert_eq!(
+            writable,
+            format!("/var/lib/{}", setting(&unit, "StateDirectory").unwrap())
+        );
+        assert_eq!(writable, state);
+        for folder in inputs.iter().chain(&written) {
+            assert!(folder.starts_with(writable), "{}", folder.display());
+        }
+        assert!(
+            setting(&unit, "ExecStart")
+                .unwrap()
+                .ends_with(file.to_str().unwrap()),
+            "{unit}"
+        );
+        assert_eq!(setting(&unit, "User"), Some("areograph"));
+        // Hooks of the package need no home and no device.
+        assert_eq!(setting(&unit, "ProtectSystem"), Some("strict"));
+    }
+    // The package makes every folder before the first start, which requires those of the inputs.
+    let made = between(&script, "for folder in ''", "; do");
+    for folder in inputs {
+        let name = folder.strip_prefix(state).unwrap().display();
+        assert!(made.contains(&format!(" /{name} ")), "{name} of{made}");
+    }
+    assert!(script.contains("u areograph - "));
 }

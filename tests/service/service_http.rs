@@ -573,65 +573,87 @@ fn behind_a_proxy_cookies_are_for_this_host_alone_and_nothing_is_open() {
     assert_eq!(page.status, 200);
 }
 
+/// Pages, and parts of each.
+const PAGES: &[(&str, &[&str])] = &[
+    (
+        "/",
+        &[
+            "<h1>Sites</h1>",
+            "Stale since",
+            "<svg",
+            "href=\"/sites/alpha\"",
+            "Night of",
+            "03:30 CET",
+        ],
+    ),
+    (
+        "/sites/alpha",
+        &[
+            "valid with remarks",
+            "range mean, m",
+            "<svg",
+            "mgs_sc_ext1.bc changed",
+            RUN,
+        ],
+    ),
+    (
+        "/sites/gamma",
+        &["is not valid and did not become current", "limit 50 m"],
+    ),
+    ("/jobs", &["crashes at stage register", "href=\"/jobs/4\""]),
+    ("/jobs?state=running", &["beta"]),
+    (
+        "/jobs/4",
+        &[
+            "its coverage overlaps image E02-01453",
+            "7 of 20",
+            "&lt;script&gt;alert(1)",
+            "<progress",
+        ],
+    ),
+    ("/jobs/7", &["signal 11"]),
+    (
+        "/runs/20260301_010000_j2_a1",
+        &[
+            "Footprints moved by at most 31 m",
+            "tables/footprints.csv",
+            "changed",
+            BEFORE,
+        ],
+    ),
+    (
+        "/kernels",
+        &["ck/mgs_sc_ext1.bc", "with 1 gap", "href=\"/sites/beta\""],
+    ),
+    ("/nights", &["href=\"/nights/1\""]),
+    ("/nights/1", &["Complete, with failures"]),
+    (
+        "/events",
+        &[
+            "succeeded",
+            "href=\"/jobs/1\"",
+            "href=\"/events?kind=alert\"",
+        ],
+    ),
+    ("/events?kind=run&site=alpha", &[RUN, "value=\"alpha\""]),
+    ("/events?kind=alert", &["None."]),
+    (
+        "/docs",
+        &[
+            "GET /api/v1/sites/{site}",
+            "href=\"#document-Status\"",
+            "id=\"document-Status\"",
+            "href=\"/openapi.json\"",
+        ],
+    ),
+    ("/login", &["type=\"password\""]),
+];
+
 #[test]
 fn pages_are_whole_without_a_script() {
     let world = World::new();
     let secret = world.folder.path().display().to_string();
-    for (path, expected) in [
-        (
-            "/",
-            &[
-                "<h1>Sites</h1>",
-                "Stale since",
-                "<svg",
-                "href=\"/sites/alpha\"",
-                "Night of",
-                "03:30 CET",
-            ][..],
-        ),
-        (
-            "/sites/alpha",
-            &[
-                "valid with remarks",
-                "range mean, m",
-                "<svg",
-                "mgs_sc_ext1.bc changed",
-                RUN,
-            ],
-        ),
-        (
-            "/sites/gamma",
-            &["is not valid and did not become current", "limit 50 m"],
-        ),
-        ("/jobs", &["crashes at stage register", "href=\"/jobs/4\""]),
-        ("/jobs?state=running", &["beta"]),
-        (
-            "/jobs/4",
-            &[
-                "its coverage overlaps image E02-01453",
-                "7 of 20",
-                "&lt;script&gt;alert(1)",
-                "<progress",
-            ],
-        ),
-        ("/jobs/7", &["signal 11"]),
-        (
-            &*format!("/runs/{RUN}"),
-            &[
-                "Footprints moved by at most 31 m",
-                "tables/footprints.csv",
-                "changed",
-                BEFORE,
-            ],
-        ),
-        (
-            "/kernels",
-            &["ck/mgs_sc_ext1.bc", "with 1 gap", "href=\"/sites/beta\""],
-        ),
-        ("/nights", &["href=\"/nights/1\""]),
-        ("/nights/1", &["Complete, with failures"]),
-        ("/login", &["type=\"password\""]),
-    ] {
+    for (path, expected) in PAGES {
         let answer = world.get(path);
         let text = answer.text();
         assert_eq!(answer.status, 200, "{path}: {text}");
@@ -639,7 +661,7 @@ fn pages_are_whole_without_a_script() {
             answer.header("content-type"),
             Some("text/html; charset=utf-8")
         );
-        for part in expected {
+        for part in *expected {
             assert!(text.contains(part), "{path}: no {part} in {text}");
         }
         assert!(
@@ -669,6 +691,24 @@ fn pages_are_whole_without_a_script() {
 }
 
 #[test]
+fn the_page_of_the_interface_names_every_operation() {
+    let world = World::new();
+    let docs = world.get("/docs").text();
+    let described = world.get("/openapi.json").json();
+    for (path, item) in described["paths"].as_object().unwrap() {
+        for method in item
+            .as_object()
+            .unwrap()
+            .keys()
+            .filter(|key| *key != "parameters")
+        {
+            let operation = format!("<code>{} {path}</code>", method.to_uppercase());
+            assert!(docs.contains(&operation), "no {operation}");
+        }
+    }
+}
+
+#[test]
 fn a_service_that_cannot_work_says_so() {
     let world = World::new();
     world.sql(
@@ -690,6 +730,39 @@ fn a_service_that_cannot_work_says_so() {
             .contains("The changed configuration was rejected")
     );
     assert_eq!(world.get("/healthz").status, 200);
+}
+
+#[test]
+fn a_lost_kernel_is_one_line_and_its_sites_wait() {
+    let world = World::new();
+    let lost = "`mgs_sc_ext1.bc` left ck/ at 2026-03-01 01:30 UTC; put the file back";
+    world.sql(&format!(
+        "UPDATE file_version SET state = 'gone' WHERE path LIKE '%mgs_sc_ext1.bc';
+         UPDATE site_input SET blake3 = NULL;
+         UPDATE site SET problem = '{lost}', stale_because = '{lost}', stale_since_ms = 1 WHERE name IN ('alpha', 'beta')",
+    ));
+    let home = world.get("/").text();
+    assert_eq!(home.matches("left ck/ at").count(), 1, "{home}");
+    let line = between(&home, "<code>mgs_sc_ext1.bc</code> left", '\n');
+    for part in [
+        "2 sites wait for it: ",
+        "href=\"/sites/alpha\"",
+        "href=\"/sites/beta\"",
+        "The products stay those of 2026-02-28 02:30 UTC.",
+    ] {
+        assert!(line.contains(part), "no {part} in {line}");
+    }
+    let table = "waits</span> for <code>mgs_sc_ext1.bc</code>";
+    assert_eq!(home.matches(table).count(), 2, "{home}");
+    assert!(home.contains("class=\"site remarks waits\"") && home.contains("dashed frame"));
+    assert!(home.contains("Next night: "));
+    let site = world.get("/sites/alpha").text();
+    assert!(site.contains("valid with remarks; waits for mgs_sc_ext1.bc"));
+    let status = world.get("/api/v1/status").json();
+    assert_eq!(status["waits"][0]["sites"], json!(["alpha", "beta"]));
+    assert_eq!(status["next_night_utc"], "2026-03-02T01:30:00.000Z");
+    let site = world.get("/api/v1/sites/beta").json();
+    assert_eq!(site["waits_for"], "mgs_sc_ext1.bc");
 }
 
 #[test]

@@ -70,6 +70,8 @@ fn a_long_history_is_as_fast_as_a_short_one() {
         "/jobs?site=gamma&state=succeeded",
         "/jobs/50000",
         "/kernels",
+        "/events",
+        "/events?kind=alert&site=alpha",
         "/nights",
         "/nights/1500",
         "/api/v1/sites?limit=200",

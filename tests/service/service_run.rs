@@ -10,7 +10,7 @@ use crate::common;
 
 use std::{
     fs,
-    io::{BufRead as _, BufReader, Write as _},
+    io::{BufRead as _, BufReader, Read as _, Write as _},
     os::unix::process::ExitStatusExt as _,
     path::{Path, PathBuf},
     process::{Child, Command, Stdio},
@@ -412,4 +412,70 @@ fn shorten_waiting(mission: &Mission) {
             [],
         )
         .unwrap();
+}
+
+/// The norm of a vector of a JSON document.
+fn norm(vector: &serde_json::Value) -> f64 {
+    let parts = vector.as_array().unwrap().iter();
+    parts
+        .map(|part| part.as_f64().unwrap().powi(2))
+        .sum::<f64>()
+        .sqrt()
+}
+
+#[test]
+fn the_new_orbit_of_a_demonstration_moves_every_camera_by_its_error() {
+    let mission = Mission::new();
+    let (service, address) = mission.start();
+    mission.wait_for_jobs(2);
+    let orbit = "mgs_nav_scene.bsp";
+    fs::copy(
+        mission.file(&format!("updates/{orbit}")),
+        mission.file(&format!("kernels/{orbit}")),
+    )
+    .unwrap();
+    mission.wait_for_jobs(4);
+    mission.wait_for("comparisons of the runs", || {
+        mission
+            .ask("SELECT id FROM run WHERE moved IS NOT NULL")
+            .len()
+            == 2
+    });
+    let sentences = mission.ask("SELECT value FROM run, json_each(moved, '$.sentences')");
+    let truth = fs::read_to_string(mission.file("truth.json")).unwrap();
+    let truth: serde_json::Value = serde_json::from_str(&truth).unwrap();
+    let profiles = truth["profiles"].as_array().unwrap().iter();
+    let of_sites = profiles.filter(|profile| profile["window"] != "gusev_crater");
+    let mut compared = 0;
+    for profile in of_sites {
+        let image = profile["image"].as_str().unwrap();
+        let error_m = norm(&profile["orbit_differences"]["nav"]["radial_along_cross_m"]);
+        let start = format!("image {image}: moved by ");
+        let moved = sentences.iter().find_map(|text| text.strip_prefix(&start));
+        let moved = moved.unwrap_or_else(|| panic!("no {start} in {sentences:?}"));
+        let moved_m: f64 = moved.split(' ').next().unwrap().parse().unwrap();
+        // The truth states the error at the middle of a profile: it varies by less than 0.1 m over a site.
+        assert!(
+            (moved_m - error_m).abs() < 0.1,
+            "{image}: {moved_m} m, {error_m} m"
+        );
+        compared += 1;
+    }
+    assert_eq!(compared, 4);
+    let run = mission
+        .ask("SELECT current_run FROM site WHERE name = 'isidis'")
+        .remove(0);
+    let page = http_get(&address, &format!("/runs/{run}"));
+    assert!(page.contains("moved: cameras by up to"), "{page}");
+    assert_eq!(service.end().code(), Some(0), "{}", mission.log());
+}
+
+/// The answer to `GET path`.
+fn http_get(address: &str, path: &str) -> String {
+    let mut stream = std::net::TcpStream::connect(address).unwrap();
+    let request = format!("GET {path} HTTP/1.1\r\nHost: {address}\r\nConnection: close\r\n\r\n");
+    stream.write_all(request.as_bytes()).unwrap();
+    let mut answer = Vec::new();
+    let _ = stream.read_to_end(&mut answer);
+    String::from_utf8_lossy(&answer).into_owned()
 }

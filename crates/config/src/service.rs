@@ -312,6 +312,8 @@ pub enum AlertKind {
     RootUnavailable,
     /// A folder of inputs is back.
     RootBack,
+    /// A file that sites read left its folder, or cannot be used.
+    InputLost,
     /// Archive files could not be fetched.
     FetchFailed,
     /// The disk is nearly full.
@@ -325,7 +327,7 @@ pub enum AlertKind {
 }
 
 impl AlertKind {
-    const WORDS: [(&'static str, Self, &'static str); 12] = [
+    const WORDS: [(&'static str, Self, &'static str); 13] = [
         (
             "failed",
             Self::Failed,
@@ -352,6 +354,11 @@ impl AlertKind {
             "root_back",
             Self::RootBack,
             "an input folder is available again",
+        ),
+        (
+            "input_lost",
+            Self::InputLost,
+            "sites wait for a file that left its folder or cannot be used",
         ),
         (
             "fetch_failed",

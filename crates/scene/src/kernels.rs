@@ -79,7 +79,7 @@ pub(super) const ARCHIVE_METAKERNEL: &str = "archive.tm";
 const ARCHIVE_MARGIN_S: f64 = 60.0;
 
 /// File name of the orbit of one family.
-fn spk_name(family: &str) -> String {
+pub(super) fn spk_name(family: &str) -> String {
     format!("mgs_{family}_scene.bsp")
 }
 

@@ -18,6 +18,7 @@
 //! | `terrain_model`, `passes` | a shifted terrain model, laser passes over it |
 //! | `kernels`, `pedr`, `sites`, `truth` | the files |
 //! | `mission`, `along` | the entry points of a mission |
+//! | `later_orbit` | an orbit that can replace the one that the sites of a mission use |
 //!
 //! Injected errors: attitude is stored 1.15 s early in the C-kernel, laser time tags are 0.117 s late, version K files
 //! are in IAU 1991; tie points are measured in images exposed some lines off their labels, and a few of them are
@@ -48,6 +49,7 @@ mod further_passes;
 mod images;
 mod kernels;
 mod laser;
+mod later_orbit;
 mod line_images;
 mod mission;
 mod orbit;
@@ -86,6 +88,7 @@ pub use error_sources::{
     Roughness, SceneErrors,
 };
 pub use images::Coder;
+pub use later_orbit::write_later_orbit;
 pub use mission::{TrueGround, write_scene, write_scene_with_images};
 pub use plane::write_plane_scene;
 pub use plane_net::{PlaneRecipe, PlaneScene};

@@ -44,3 +44,10 @@ pub fn utc_text(utc_ms: i64) -> String {
     let instant = DateTime::<Utc>::from_timestamp_millis(utc_ms).unwrap_or_default();
     instant.to_rfc3339_opts(SecondsFormat::Millis, true)
 }
+
+/// An instant in UTC, to the minute, for a sentence.
+#[must_use]
+pub fn minute_text(utc_ms: i64) -> String {
+    let instant = DateTime::<Utc>::from_timestamp_millis(utc_ms).unwrap_or_default();
+    instant.format("%Y-%m-%d %H:%M UTC").to_string()
+}

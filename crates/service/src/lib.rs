@@ -18,6 +18,7 @@
 //! ```
 
 pub mod audit;
+pub mod check;
 pub mod clock;
 pub mod contents;
 pub mod database;

@@ -12,7 +12,7 @@ use super::{clock::utc_text, private::create_folder};
 use areograph_base::error::{Cause, IoError, Locate as _, Result};
 
 /// Name of the lock in the state folder.
-const LOCK: &str = "service.lock";
+pub(crate) const LOCK: &str = "service.lock";
 
 /// Types of file systems on which neither locks nor the database are reliable.
 const NETWORK: [(i64, &str); 5] = [
@@ -56,7 +56,7 @@ enum LockError {
 }
 
 impl Owner {
-    fn words(&self) -> String {
+    pub(crate) fn words(&self) -> String {
         format!("areograph {} (process {})", self.command, self.pid)
     }
 
@@ -79,9 +79,7 @@ impl ServiceLock {
         create_folder(folder)
             .map_err(IoError::on("create the folder"))
             .in_file(folder)?;
-        if let Some(network) = network_file_system(folder) {
-            return Err(LockError::Network(network)).in_file(folder);
-        }
+        refuse_network(folder).in_file(folder)?;
         let path = folder.join(LOCK);
         let file = File::options()
             .create(true)
@@ -121,14 +119,17 @@ impl ServiceLock {
     }
 }
 
-fn owner_of(path: &Path) -> Option<Owner> {
+pub(crate) fn owner_of(path: &Path) -> Option<Owner> {
     serde_json::from_slice(&fs::read(path).ok()?).ok()
 }
 
-fn network_file_system(folder: &Path) -> Option<&'static str> {
-    let found = rustix::fs::statfs(folder).ok()?.f_type;
-    let network = NETWORK.iter().find(|(kind, _)| *kind == found);
-    network.map(|(_, name)| *name)
+/// Refuses a folder on a network file system.
+pub(crate) fn refuse_network(folder: &Path) -> Result<()> {
+    let found = rustix::fs::statfs(folder).ok().map(|found| found.f_type);
+    match NETWORK.iter().find(|(kind, _)| Some(*kind) == found) {
+        Some((_, network)) => Err(LockError::Network(network).into()),
+        None => Ok(()),
+    }
 }
 
 #[cfg(test)]

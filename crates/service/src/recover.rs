@@ -40,8 +40,8 @@ pub fn examine(database: &Database, products: &Path) -> Result<()> {
             ))
         })
         .in_file(state)?;
+    refuse_foreign(known.as_deref(), products).in_file(state)?;
     let is_lost = match (&known, &marked) {
-        (Some(known), Some(marked)) if known != marked => return Err(foreign()).in_file(state),
         (None, Some(_)) if is_used => return Err(foreign()).in_file(state),
         (Some(_), _) => is_lost,
         // Written before databases and products were marked.
@@ -50,6 +50,14 @@ pub fn examine(database: &Database, products: &Path) -> Result<()> {
     };
     let id = identify(database, known.or(marked), is_lost)?;
     mark(products, &id, is_used)
+}
+
+/// Refuses a database of which the identity is not that of the products.
+pub(crate) fn refuse_foreign(known: Option<&str>, products: &Path) -> Result<()> {
+    match (known, owner(products)?) {
+        (Some(known), Some(marked)) if known != marked => Err(foreign().into()),
+        _ => Ok(()),
+    }
 }
 
 fn foreign() -> DatabaseError {

@@ -13,13 +13,16 @@ use serde_json::json;
 use super::{
     clock::Clock,
     database::{About, Database, Stored, append, files::roots, service::put_service},
-    engine::{folders::folders, schedule::Schedule},
+    engine::{
+        folders::{Folder, folders},
+        schedule::Schedule,
+    },
     lock::{Owner, ServiceLock},
     recover::{examine, is_lost},
     shared::Shared,
     worker::process::ProcessIdentity,
 };
-use areograph_base::error::{Cause, IoError, Locate as _, Result};
+use areograph_base::error::{Cause, Error, IoError, Locate as _, Result};
 use areograph_config::{Document as _, ServiceConfig};
 
 /// A started service, which owns its state folder for the lifetime of this value.
@@ -136,10 +139,13 @@ fn seen(connection: &Connection, config: &ServiceConfig) -> Stored<Result<()>> {
     });
     Ok(match unseen {
         None => Ok(()),
-        Some(folder) => {
-            Err(Refused::NeverSeen(folder.kind.name(), folder.path)).in_file(&config.file)
-        }
+        Some(folder) => Err(never_seen(&folder)).in_file(&config.file),
     })
+}
+
+/// The fault of a folder of inputs that does not exist and is unknown to the service.
+pub(crate) fn never_seen(folder: &Folder) -> Error {
+    Refused::NeverSeen(folder.kind.name(), folder.path.clone()).into()
 }
 
 /// Records the address of the service in its lock and in the database.

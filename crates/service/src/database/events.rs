@@ -73,6 +73,35 @@ pub fn events_after(connection: &Connection, after: i64, limit: u32) -> Stored<V
     Ok(found.collect::<Result<_, _>>()?)
 }
 
+/// A filter of events.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct EventFilter<'a> {
+    /// This kind; without it all but `stage` and `progress`.
+    pub kind: Option<&'a str>,
+    /// The site that they concern.
+    pub site: Option<&'a str>,
+    /// Numbers below this one.
+    pub before: Option<i64>,
+}
+
+/// At most `limit` events, newest first.
+///
+/// # Errors
+/// SQLite errors.
+pub fn events_before(
+    connection: &Connection,
+    filter: &EventFilter<'_>,
+    limit: u32,
+) -> Stored<Vec<Event>> {
+    let mut query = connection.prepare_cached(
+        "SELECT * FROM event WHERE seq < ?1 AND (?2 IS NULL OR site = ?2)
+         AND CASE WHEN ?3 IS NULL THEN kind NOT IN ('stage', 'progress') ELSE kind = ?3 END ORDER BY seq DESC LIMIT ?4",
+    )?;
+    let before = filter.before.unwrap_or(i64::MAX);
+    let found = query.query_map(params![before, filter.site, filter.kind, limit], event)?;
+    Ok(found.collect::<Result<_, _>>()?)
+}
+
 /// The number of the newest event, 0 before the first.
 ///
 /// # Errors

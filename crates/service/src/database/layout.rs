@@ -28,11 +28,11 @@ pub(crate) fn free_name(folder: &Path, stem: &str) -> PathBuf {
     paths.find(is_free).unwrap_or(first)
 }
 
-/// Gives the database in `folder` the present layout, after a copy of a former one.
+/// The layout of a database; `None` for an empty one.
 ///
 /// # Errors
 /// It is newer, or of another program; SQLite errors.
-pub(super) fn migrate(connection: &mut Connection, folder: &Path) -> Stored<()> {
+pub(super) fn layout_of(connection: &Connection) -> Stored<Option<i64>> {
     let found: i64 = connection.query_row("PRAGMA user_version", [], |row| row.get(0))?;
     if found > VERSION {
         return Err(DatabaseError::Newer { found });
@@ -48,10 +48,19 @@ pub(super) fn migrate(connection: &mut Connection, folder: &Path) -> Stored<()> 
         let why = "its tables belong to another program".to_owned();
         return Err(DatabaseError::Foreign(why));
     }
-    if found == VERSION {
+    Ok((!is_empty).then_some(found))
+}
+
+/// Gives the database in `folder` the present layout, after a copy of a former one.
+///
+/// # Errors
+/// Those of [`layout_of`]; SQLite errors.
+pub(super) fn migrate(connection: &mut Connection, folder: &Path) -> Stored<()> {
+    let found = layout_of(connection)?;
+    if found == Some(VERSION) {
         return Ok(());
     }
-    if !is_empty {
+    if found.is_some() {
         copy(
             connection,
             &free_name(folder, &format!("before-layout-{VERSION}")),
@@ -59,7 +68,7 @@ pub(super) fn migrate(connection: &mut Connection, folder: &Path) -> Stored<()> 
     }
     let transaction = connection.transaction()?;
     match found {
-        1 => transaction.execute_batch(CHECKED_RUNS)?,
+        Some(1) => transaction.execute_batch(CHECKED_RUNS)?,
         _ => transaction.execute_batch(SCHEMA)?,
     }
     transaction.pragma_update(None, "user_version", VERSION)?;

@@ -15,6 +15,7 @@ pub mod scrubs;
 pub mod service;
 pub mod shown;
 pub mod sites;
+pub mod waits;
 
 use std::{
     fs,
@@ -28,10 +29,10 @@ use serde_json::Value;
 
 use crate::private::{create_file, create_folder};
 use areograph_base::error::{Cause, IoError, Locate as _, Result};
-use layout::{VERSION, migrate};
+use layout::{VERSION, layout_of, migrate};
 
 pub use causes::{CauseKind, CauseRow, add_cause, causes};
-pub use events::{About, Event, append, events_after, newest_event};
+pub use events::{About, Event, EventFilter, append, events_after, events_before, newest_event};
 pub use jobs::{
     Enqueued, Job, JobFilter, JobRequest, Moved, Priority, WrongTransition, active_job, advance,
     due_waiting, enqueue, give_back, job, jobs, jobs_in, next_queued, pending_job, request_cancel,
@@ -234,6 +235,57 @@ fn connect(path: &Path, flags: OpenFlags) -> Stored<Connection> {
     connection.pragma_update(None, "foreign_keys", true)?;
     connection.pragma_update(None, "trusted_schema", false)?;
     Ok(connection)
+}
+
+/// Layout of an existing database.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Layout {
+    /// The present one.
+    Present(i64),
+    /// A former one, which the next start migrates.
+    Former(i64),
+}
+
+/// An existing database as a service would find it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Seen {
+    /// Its layout.
+    pub layout: Layout,
+    /// The service to which it belongs, if it states this.
+    pub identity: Option<String>,
+    /// Paths of the known folders of inputs.
+    pub roots: Vec<String>,
+}
+
+/// Looks at the database in `folder` and changes nothing; `None` without a database.
+///
+/// # Errors
+/// Those for which a service refuses the database.
+pub fn look_at(folder: &Path) -> Result<Option<Seen>> {
+    let path = folder.join(DATABASE);
+    match fs::symlink_metadata(&path) {
+        Err(_) => return Ok(None),
+        Ok(_) if !path.is_file() => return Err(DatabaseError::NotAFile).in_file(path),
+        Ok(found) if found.len() == 0 => return Ok(None),
+        Ok(_) => {}
+    }
+    let connection = connect(&path, OpenFlags::SQLITE_OPEN_READ_ONLY).in_file(&path)?;
+    let look = || {
+        sound(&connection)?;
+        let layout = match layout_of(&connection)? {
+            None => return Ok(None),
+            Some(VERSION) => Layout::Present(VERSION),
+            Some(former) => Layout::Former(former),
+        };
+        let identity = facts::fact(&connection, facts::IDENTITY)?;
+        let known = files::roots(&connection)?;
+        Ok::<_, DatabaseError>(Some(Seen {
+            layout,
+            identity,
+            roots: known.into_iter().map(|root| root.path).collect(),
+        }))
+    };
+    look().in_file(&path)
 }
 
 fn sound(connection: &Connection) -> Stored<()> {

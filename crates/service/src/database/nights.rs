@@ -135,7 +135,8 @@ pub fn end_night(transaction: &Transaction<'_>, id: i64, now_ms: i64) -> Stored<
     transaction.execute(
         "UPDATE night SET ended_ms = ?2,
          runs = (SELECT count(*) FROM run JOIN job ON job.id = run.job WHERE job.night = ?1),
-         failures = (SELECT count(*) FROM job WHERE night = ?1 AND state IN ('failed', 'invalid', 'blocked'))
+         failures = (SELECT count(*) FROM job WHERE night = ?1 AND (state IN ('failed', 'invalid', 'blocked')
+           OR state = 'held' AND site IN (SELECT name FROM site WHERE problem IS NOT NULL)))
          WHERE id = ?1 AND ended_ms IS NULL",
         params![id, now_ms],
     )?;

@@ -9,9 +9,12 @@ use crate::{
         About, Stored,
         alerts::{Edge, put_alert_state, put_notification},
         append,
+        waits::{SUBJECT, alerted_waits, waits},
     },
+    words::counted,
 };
 use areograph_config::{AlertKind, ServiceConfig};
+use areograph_store::files::file_name;
 
 /// An alert.
 #[derive(Debug, Clone, Copy)]
@@ -70,6 +73,49 @@ pub fn tell(
     Ok(())
 }
 
+/// Reports once each file for which sites wait, and the end of this wait.
+///
+/// # Errors
+/// SQLite errors.
+pub fn tell_waits(
+    transaction: &Transaction<'_>,
+    config: &ServiceConfig,
+    now_ms: i64,
+) -> Stored<()> {
+    let alert = |kind, text: &str, more: &Value| {
+        let alert = Alert {
+            kind,
+            site: None,
+            run: None,
+            text,
+        };
+        tell(transaction, config, now_ms, &alert, more)
+    };
+    let mut ended = alerted_waits(transaction)?;
+    for wait in waits(transaction)? {
+        let subject = format!("{SUBJECT}{}", wait.path);
+        ended.retain(|known| *known != subject);
+        let verb = if wait.sites.len() == 1 {
+            "waits"
+        } else {
+            "wait"
+        };
+        let sites = counted(wait.sites.len(), "site");
+        let text = format!("{sites} {verb}: {}", wait.text);
+        if put_alert_state(transaction, now_ms, &subject, "wrong")? != Edge::None {
+            let more = json!({ "sites": wait.sites });
+            alert(AlertKind::InputLost, &text, &more)?;
+        }
+    }
+    for subject in ended {
+        put_alert_state(transaction, now_ms, &subject, "well")?;
+        let name = file_name(subject.trim_start_matches(SUBJECT).as_ref());
+        let text = format!("no site waits for `{name}` any more");
+        alert(AlertKind::Recovered, &text, &Value::Null)?;
+    }
+    Ok(())
+}
+
 /// State of a site, for alerts on changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Standing {
@@ -81,7 +127,7 @@ pub enum Standing {
     Invalid,
 }
 
-/// Reports a change of a site's state.
+/// Reports a change of a site's state; returns whether it changed.
 ///
 /// # Errors
 /// SQLite errors.
@@ -92,7 +138,7 @@ pub fn tell_standing(
     site: &str,
     standing: Standing,
     text: &str,
-) -> Stored<()> {
+) -> Stored<bool> {
     let state = match standing {
         Standing::Well => "well",
         Standing::Failed => "failed",
@@ -100,7 +146,7 @@ pub fn tell_standing(
     };
     let edge = put_alert_state(transaction, now_ms, &format!("site {site}"), state)?;
     let kind = match (standing, edge) {
-        (_, Edge::None) | (Standing::Well, Edge::First) => return Ok(()),
+        (_, Edge::None) | (Standing::Well, Edge::First) => return Ok(false),
         (Standing::Well, Edge::From(_)) => AlertKind::Recovered,
         (Standing::Failed, _) => AlertKind::Failed,
         (Standing::Invalid, _) => AlertKind::Invalid,
@@ -111,7 +157,8 @@ pub fn tell_standing(
         run: None,
         text,
     };
-    tell(transaction, config, now_ms, &alert, &Value::Null)
+    tell(transaction, config, now_ms, &alert, &Value::Null)?;
+    Ok(true)
 }
 
 /// Reports the beginning of a fault, or with another kind its end, if the state changed.

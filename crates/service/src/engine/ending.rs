@@ -102,15 +102,18 @@ pub fn finish<W: Workers>(
             }
         };
         let said = moved.outcome.as_ref().map(outcome_text).unwrap_or_default();
-        tracing::info!(
-            site = attempt.site,
-            job = job.id,
-            attempt = attempt.n,
-            "{state}: {said}"
-        );
         go(transaction, now_ms, &job, state, &moved)?;
-        if let Some(standing) = standing(state) {
-            tell_standing(transaction, &config, now_ms, &attempt.site, standing, &said)?;
+        let text = format!("{state}: {said}");
+        let alerted = match standing(state) {
+            None => false,
+            Some(standing) => {
+                tell_standing(transaction, &config, now_ms, &attempt.site, standing, &text)?
+            }
+        };
+        // An alert is in the log already.
+        if !alerted {
+            let (site, attempt) = (&attempt.site, attempt.n);
+            tracing::info!(site, job = job.id, attempt, "{text}");
         }
         fresh::refresh(transaction, now_ms, Some(&attempt.site))?;
         Ok(true)

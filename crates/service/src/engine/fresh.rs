@@ -7,7 +7,7 @@ use rusqlite::{Connection, Transaction, params};
 use serde_json::Value;
 
 use super::{
-    alerts::{Alert, tell_edge},
+    alerts::{Alert, tell_edge, tell_waits},
     hold::not_ready,
     retry::milliseconds,
 };
@@ -112,7 +112,7 @@ fn hours_ms(hours: f64) -> i64 {
     milliseconds(hours * 3600.0)
 }
 
-/// Reports once each site that has been stale, or was not compared, for too long.
+/// Reports once each file for which sites wait, and each site that has been stale, or was not compared, for too long.
 ///
 /// # Errors
 /// SQLite errors.
@@ -121,6 +121,7 @@ pub fn tell_stale(
     config: &ServiceConfig,
     now_ms: i64,
 ) -> Stored<()> {
+    tell_waits(transaction, config, now_ms)?;
     let freshness = &config.freshness;
     let stale_before_ms = now_ms.saturating_sub(hours_ms(freshness.stale_after_h));
     let unchecked_before_ms = now_ms.saturating_sub(hours_ms(freshness.unchecked_after_h));

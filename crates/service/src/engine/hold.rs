@@ -10,6 +10,7 @@ use crate::{
         Job, Moved, Stored, advance,
         files::{RootKind, RootState, roots},
         jobs_in,
+        waits::waits,
     },
     state::JobState,
 };
@@ -22,6 +23,8 @@ pub struct NotReady {
     by_site: BTreeMap<String, String>,
     /// For others, whose inputs are unknown.
     unplanned: Option<String>,
+    /// For sites of which a file left its folder.
+    lost: BTreeMap<String, String>,
     /// Sites whose inputs are known.
     planned: std::collections::BTreeSet<String>,
 }
@@ -30,6 +33,12 @@ impl NotReady {
     /// The reason for which the inputs of a site are not usable now; `None` if they are.
     #[must_use]
     pub fn of(&self, site: &str) -> Option<String> {
+        self.to_plan(site).or_else(|| self.lost.get(site).cloned())
+    }
+
+    /// The reason for which a site cannot even be planned. A lost file is none: the site may cease to name it.
+    #[must_use]
+    pub fn to_plan(&self, site: &str) -> Option<String> {
         if self.planned.contains(site) {
             return self.by_site.get(site).cloned();
         }
@@ -71,14 +80,15 @@ pub fn not_ready(connection: &Connection) -> Stored<NotReady> {
             found.by_site.entry(site).or_insert(why);
         }
     }
-    let mut query = connection.prepare_cached(
-        "SELECT i.site, f.path, f.detail FROM file_version f JOIN site_input i ON i.path = f.path WHERE f.state = 'bad'",
-    )?;
-    let mut rows = query.query([])?;
-    while let Some(row) = rows.next()? {
-        let (path, detail): (String, String) = (row.get(1)?, row.get(2)?);
-        let why = format!("`{}` cannot be used: {detail}", file_name(path.as_ref()));
-        found.by_site.entry(row.get(0)?).or_insert(why);
+    for wait in waits(connection)? {
+        let known = if wait.is_lost() {
+            &mut found.lost
+        } else {
+            &mut found.by_site
+        };
+        for site in wait.sites {
+            known.entry(site).or_insert_with(|| wait.text.clone());
+        }
     }
     Ok(found)
 }
@@ -100,7 +110,7 @@ fn changed_below(connection: &Connection, site: &str, root: &str) -> Stored<Opti
 /// # Errors
 /// SQLite errors.
 pub fn hold(transaction: &Transaction<'_>, now_ms: i64, job: &Job, why: &str) -> Stored<()> {
-    tracing::info!(site = job.site, job = job.id, "held: {why}");
+    tracing::debug!(site = job.site, job = job.id, "held: {why}");
     let moved = Moved {
         outcome: Some(json!({ "text": why })),
         ..Moved::default()

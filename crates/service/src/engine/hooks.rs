@@ -1,7 +1,12 @@
 //! Hooks: programs run without a shell, with JSON on their standard input, for at most 30 s.
 
-use std::{process::Stdio, time::Duration};
+use std::{
+    path::{Path, PathBuf},
+    process::Stdio,
+    time::Duration,
+};
 
+use rustix::fs::{Access, access};
 use rustix::process::{Pid, Signal, kill_process_group};
 use tokio::{
     io::{AsyncReadExt as _, AsyncWriteExt as _},
@@ -65,6 +70,18 @@ pub async fn deliver<W: Workers>(core: &Core<W>) -> Stored<()> {
 fn delay_ms(notification: &Notification) -> i64 {
     let doublings = u32::try_from(notification.tries.min(20)).unwrap_or_default();
     DELAY_MS.0.saturating_mul(1 << doublings).min(DELAY_MS.1)
+}
+
+/// The executable file of a hook, searched for as at its start.
+pub(crate) fn program_of(program: &str) -> Option<PathBuf> {
+    let is_program = |path: &PathBuf| path.is_file() && access(path, Access::EXEC_OK).is_ok();
+    if program.contains('/') {
+        return Some(PathBuf::from(program)).filter(is_program);
+    }
+    let places = PATH
+        .split(':')
+        .map(|folder| Path::new(folder).join(program));
+    places.into_iter().find(is_program)
 }
 
 /// Runs a hook; returns the reason of a failure.

@@ -20,6 +20,7 @@ use crate::{
         pending_job,
         runs::{is_run, run},
         sites::{Checked, SiteInput, SiteRow, inputs_of, put_checked, put_inputs},
+        waits::lost_input,
     },
     state::JobState,
     worker::{
@@ -89,12 +90,22 @@ pub async fn plan<W: Workers>(
         now_ms,
     };
     core.shared.write(|transaction| {
+        let lost = match &planned {
+            Planned::Refused(text) => lost_input(transaction, context.name(), text)?,
+            _ => None,
+        };
         let note = match planned {
             Planned::Answer(answer) => context.answered(transaction, answer)?,
-            Planned::Refused(text) => context.refused(transaction, text, Some(text))?,
+            Planned::Refused(text) => {
+                let text = lost.as_deref().unwrap_or(text);
+                context.refused(transaction, text, Some(text))?
+            }
             Planned::Crashed(text) => context.refused(transaction, &text, None)?,
         };
-        tracing::info!(site = site.name, "{note}");
+        // A lost file is reported once for all sites that read it.
+        if lost.is_none() {
+            tracing::info!(site = site.name, "{note}");
+        }
         let about = About {
             site: Some(&site.name),
             ..About::default()
@@ -175,7 +186,8 @@ impl Context<'_> {
         Ok(note)
     }
 
-    /// A site that cannot be planned is run nevertheless: the job reports the reason, and waits for another input.
+    /// A site that cannot be planned has a job nevertheless, which reports the reason and waits for another input. It is
+    /// held, not run, while the reason is a lost file.
     fn refused(
         &self,
         transaction: &Transaction<'_>,

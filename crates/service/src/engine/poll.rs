@@ -89,11 +89,12 @@ pub fn compare(poll: &Poll<'_>) -> Polled {
 /// The files, or the reason for which the folder is unavailable.
 fn unavailable<'a>(poll: &Poll<'a>) -> Result<&'a BTreeMap<String, Identity>, String> {
     let found = poll.found.map_err(str::to_owned)?;
-    if found.is_empty() {
-        return Err("the folder is empty".to_owned());
-    }
     let there = |file: &&FileRow| file.state != FileState::Gone;
     let known = poll.known.values().filter(there).count();
+    // A folder that never held a file, such as that of tie points, is merely not in use.
+    if found.is_empty() && known > 0 {
+        return Err("the folder is empty".to_owned());
+    }
     let is_lost = |file: &&FileRow| there(file) && !found.contains_key(&file.path);
     let lost = poll.known.values().filter(is_lost).count();
     if lost as f64 > poll.max_loss * known as f64 {
@@ -258,6 +259,19 @@ mod tests {
         assert_eq!(folder.poll(QUIET_MS + 1, Ok(())), (0, 10));
         assert_eq!(folder.root.state, RootState::Available);
         assert_eq!(folder.poll(QUIET_MS + 2, Ok(())), (0, 0));
+    }
+
+    #[test]
+    fn a_folder_that_never_held_a_file_is_available() {
+        let mut folder = Folder::new(0);
+        assert_eq!(folder.poll(QUIET_MS, Ok(())), (0, 0));
+        assert_eq!(folder.root.state, RootState::Available);
+        folder.files.insert("/k/a.bc".to_owned(), identity(1, 0));
+        assert_eq!(folder.poll(QUIET_MS + 1, Ok(())), (1, 0));
+        assert_eq!(folder.poll(QUIET_MS + 2, Ok(())), (0, 1));
+        folder.files.clear();
+        assert_eq!(folder.poll(QUIET_MS + 3, Ok(())), (0, 0));
+        assert_eq!(folder.root.state, RootState::Unavailable);
     }
 
     #[test]

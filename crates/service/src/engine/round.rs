@@ -243,7 +243,7 @@ fn candidates(
         unchanged: Vec::new(),
     };
     for site in all.into_iter().filter(|site| site.enabled) {
-        if waits.of(&site.name).is_some() || active_job(connection, &site.name)?.is_some() {
+        if waits.to_plan(&site.name).is_some() || active_job(connection, &site.name)?.is_some() {
             continue;
         }
         let changed = changed.remove(&site.name).unwrap_or_default();

@@ -110,6 +110,12 @@ impl Schedule {
     }
 }
 
+/// The next instant of a schedule after `now_ms`, if the schedule is valid.
+#[must_use]
+pub fn next_night_ms(config: &ScheduleConfig, now_ms: i64) -> Option<i64> {
+    Schedule::of(config, now_ms).ok()?.next_after(now_ms)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -38,7 +38,6 @@ pub async fn settle<W: Workers>(
     settled: Vec<FileRow>,
     round: i64,
 ) -> Stored<()> {
-    let now_ms = core.now_ms();
     let (missing, there): (Vec<FileRow>, Vec<FileRow>) = settled.into_iter().partition(is_missing);
     core.shared.write(|transaction| {
         for file in missing {
@@ -46,7 +45,6 @@ pub async fn settle<W: Workers>(
             let gone = FileRow {
                 state: FileState::Gone,
                 detail: String::new(),
-                changed_ms: now_ms,
                 round,
                 ..file
             };

@@ -10,7 +10,8 @@ use crate::fake;
 use std::sync::{Arc, atomic::Ordering};
 
 use areograph_service::{
-    database::{CauseKind, CauseRow, JobRequest, Priority, enqueue, request_cancel},
+    clock::minute_text,
+    database::{CauseKind, CauseRow, JobRequest, Priority, enqueue, request_cancel, waits::waits},
     state::JobState,
 };
 use fake::{Fate, Life, World};
@@ -200,16 +201,20 @@ fn a_kernel_whose_check_was_interrupted_is_checked_again() {
 }
 
 #[test]
-fn what_only_another_input_mends_is_blocked_until_it_comes() {
+fn a_lost_file_holds_its_site_until_it_comes() {
     let (world, life) = two_sites("");
+    let left = minute_text(world.clock.now_ms() + 60_000);
     world.remove("kernels/a.bsp");
     life.go_on(&world, 60, 15);
-    assert_eq!(later_jobs(&life), [("a".to_owned(), JobState::Blocked)]);
-    let text = life.ask("SELECT outcome FROM job WHERE state = 'blocked'");
-    assert!(text[0].contains("there is no a.bsp"), "{text:?}");
+    assert_eq!(later_jobs(&life), [("a".to_owned(), JobState::Held)]);
+    let text = life.ask("SELECT outcome FROM job WHERE state = 'held'");
+    assert!(
+        text[0].contains(&format!("`a.bsp` left kernels/ at {left}")),
+        "{text:?}"
+    );
     assert!(world.current("a").is_some(), "products stay served");
     life.go_on(&world, 3600, 3);
-    assert_eq!(life.jobs()[2].attempt, 1, "no retry");
+    assert_eq!(life.jobs()[2].attempt, 0, "no attempt");
     world.put("kernels/a.bsp", "again");
     life.go_on(&world, 60, 15);
     assert_eq!(later_jobs(&life), [("a".to_owned(), JobState::Succeeded)]);
@@ -220,6 +225,54 @@ fn what_only_another_input_mends_is_blocked_until_it_comes() {
     life.go_on(&world, 60, 15);
     let last = later_jobs(&life).pop().unwrap();
     assert_eq!(last, ("b".to_owned(), JobState::Superseded));
+}
+
+#[test]
+fn a_lost_file_of_several_sites_is_one_alert_and_a_site_may_cease_to_read_it() {
+    let (world, life) = two_sites("");
+    world.remove("kernels/both.bc");
+    life.go_on(&world, 60, 15);
+    let held = |site: &str| (site.to_owned(), JobState::Held);
+    let mut jobs = later_jobs(&life);
+    jobs.sort();
+    assert_eq!(jobs, [held("a"), held("b")]);
+    let alerts = life.ask(
+        "SELECT json_extract(data, '$.alert') || ': ' || json_extract(data, '$.text') FROM event WHERE kind = 'alert'",
+    );
+    assert_eq!(alerts.len(), 1, "{alerts:?}");
+    assert!(
+        alerts[0]
+            .starts_with("input_lost: 2 sites wait: `both.bc` left kernels/ at 2026-05-01 13:0"),
+        "{alerts:?}"
+    );
+    let waiting = |life: &Life| life.shared.read(waits).unwrap();
+    assert_eq!(waiting(&life)[0].sites, ["a", "b"]);
+    // The night plans nothing, and the site that no longer names the file is run.
+    let night = life.engine.begin_night().unwrap().unwrap();
+    life.settle();
+    assert!(
+        life.engine
+            .night(night)
+            .unwrap()
+            .unwrap()
+            .ended_utc
+            .is_some()
+    );
+    world.site("a", &["a.bsp"]);
+    life.go_on(&world, 60, 15);
+    assert_eq!(world.current("a"), world.clean("a"));
+    assert_eq!(waiting(&life)[0].sites, ["b"]);
+    // A service that starts again knows the cause, and reports it no second time.
+    life.kill();
+    let life = Life::begin(&world);
+    life.go_on(&world, 60, 2);
+    world.put("kernels/both.bc", "second");
+    life.go_on(&world, 60, 15);
+    assert_eq!(world.current("b"), world.clean("b"));
+    assert_eq!(waiting(&life), []);
+    let alerts = life
+        .ask("SELECT json_extract(data, '$.alert') FROM event WHERE kind = 'alert' ORDER BY seq");
+    assert_eq!(alerts, ["input_lost", "night_complete", "recovered"]);
 }
 
 #[test]

@@ -1,10 +1,16 @@
 //! Current state of the sites.
 
+use std::collections::BTreeMap;
+
 use rusqlite::{Connection, OptionalExtension as _, Row, params};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::{database::Stored, instant::Instant, state::JobState};
+use crate::{
+    database::{Stored, waits::waits},
+    instant::Instant,
+    state::JobState,
+};
 
 /// Current state of a site.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, ToSchema)]
@@ -39,6 +45,8 @@ pub struct Site {
     pub job: Option<i64>,
     /// State of that job.
     pub job_state: Option<JobState>,
+    /// The file or folder for which it waits.
+    pub waits_for: Option<String>,
     /// Extent of its windows: west, south, east, north, degrees of east longitude and areocentric latitude.
     pub bounds_deg: Option<[f64; 4]>,
 }
@@ -60,7 +68,31 @@ pub fn sites(connection: &Connection, after: &str, limit: u32) -> Stored<Vec<Sit
         "{SELECT} WHERE s.name > ?1 ORDER BY s.name LIMIT ?2"
     ))?;
     let found = query.query_map(params![after, limit], read)?;
-    Ok(found.collect::<Result<_, _>>()?)
+    let mut sites = found.collect::<Result<Vec<_>, _>>()?;
+    put_waits(connection, &mut sites)?;
+    Ok(sites)
+}
+
+/// States the file or folder for which sites wait.
+fn put_waits(connection: &Connection, sites: &mut [Site]) -> Stored<()> {
+    let mut known = BTreeMap::new();
+    for wait in waits(connection)? {
+        for site in &wait.sites {
+            known.entry(site.clone()).or_insert_with(|| wait.name());
+        }
+    }
+    let mut query = connection.prepare_cached(
+        "SELECT DISTINCT i.site, r.path FROM root r JOIN site_input i ON i.path > r.path || '/' AND i.path < r.path || '0'
+         WHERE r.state = 'unavailable'",
+    )?;
+    let mut rows = query.query([])?;
+    while let Some(row) = rows.next()? {
+        known.insert(row.get(0)?, row.get(1)?);
+    }
+    for site in sites.iter_mut().filter(|site| site.enabled) {
+        site.waits_for = known.remove(&site.name);
+    }
+    Ok(())
 }
 
 /// A site by its name.
@@ -69,7 +101,9 @@ pub fn sites(connection: &Connection, after: &str, limit: u32) -> Stored<Vec<Sit
 /// SQLite errors.
 pub fn site(connection: &Connection, name: &str) -> Stored<Option<Site>> {
     let mut query = connection.prepare_cached(&format!("{SELECT} WHERE s.name = ?1"))?;
-    Ok(query.query_row([name], read).optional()?)
+    let mut found = query.query_row([name], read).optional()?;
+    put_waits(connection, found.as_mut_slice())?;
+    Ok(found)
 }
 
 /// Numbers of sites and of stale sites.
@@ -111,6 +145,7 @@ fn read(row: &Row<'_>) -> rusqlite::Result<Site> {
         newest_verdict: row.get("newest_verdict")?,
         job: row.get("job")?,
         job_state: state.and_then(|state| state.parse().ok()),
+        waits_for: None,
         bounds_deg,
     })
 }

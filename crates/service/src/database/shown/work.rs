@@ -54,6 +54,51 @@ pub fn totals(connection: &Connection) -> Stored<Totals> {
     })
 }
 
+/// Endings of binary and text kernels, and the kinds that they name.
+const KINDS: [(&str, &str); 7] = [
+    ("bsp", "spk"),
+    ("bc", "ck"),
+    ("tls", "lsk"),
+    ("tsc", "sclk"),
+    ("tpc", "pck"),
+    ("tf", "fk"),
+    ("ti", "ik"),
+];
+
+/// Sites by the word of their verdict, and the last change of a usable kernel by kind.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Standing {
+    /// Verdicts of the current runs of enabled sites, and their number; `None` without a run.
+    pub verdicts: Vec<(Option<String>, i64)>,
+    /// Kinds of kernels that exist, and the last change, milliseconds of UTC since 1970.
+    pub newest_kernels: Vec<(&'static str, i64)>,
+}
+
+/// Counts verdicts, and finds the newest kernel of each kind.
+///
+/// # Errors
+/// SQLite errors.
+pub fn standing(connection: &Connection) -> Stored<Standing> {
+    let mut query = connection.prepare_cached(
+        "SELECT r.verdict, count(*) FROM site s LEFT JOIN run r ON r.id = s.current_run WHERE s.enabled GROUP BY 1",
+    )?;
+    let verdicts = query.query_map([], |row| Ok((row.get(0)?, row.get(1)?)))?;
+    let mut newest_kernels = Vec::new();
+    let mut query = connection.prepare_cached(
+        "SELECT max(f.changed_ms) FROM root r JOIN file_version f ON f.path > r.path || '/' AND f.path < r.path || '0'
+         WHERE r.kind = 'kernels' AND f.state = 'ready' AND f.path LIKE ?1",
+    )?;
+    let verdicts = verdicts.collect::<Result<_, _>>()?;
+    for (ending, kind) in KINDS {
+        let newest: Option<i64> = query.query_row([format!("%.{ending}")], |row| row.get(0))?;
+        newest_kernels.extend(newest.map(|at_ms| (kind, at_ms)));
+    }
+    Ok(Standing {
+        verdicts,
+        newest_kernels,
+    })
+}
+
 /// When the last night that was not missed ended.
 ///
 /// # Errors

@@ -7,6 +7,7 @@ mod jobs;
 mod kernels;
 mod life;
 mod logs;
+mod measures;
 mod new_jobs;
 mod nights;
 mod plans;
@@ -15,9 +16,10 @@ mod shots;
 mod sites;
 mod status;
 
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 use axum::{Json, Router, response::IntoResponse as _, routing::get};
+use serde_json::Value;
 use utoipa::{
     Modify, OpenApi,
     openapi::{
@@ -59,18 +61,25 @@ impl Modify for Tokens {
 
 /// All routes for programs.
 pub(super) fn routes() -> Router<Arc<App>> {
-    let (router, mut description) = described().split_for_parts();
-    // The router's notation for a parameter that may contain `/`.
-    let paths = std::mem::take(&mut description.paths.paths);
-    let named = paths
-        .into_iter()
-        .map(|(path, item)| (path.replace("{*", "{"), item));
-    description.paths.paths = named.collect();
-    let description = Arc::new(description);
-    router.route(
+    described().split_for_parts().0.route(
         "/openapi.json",
-        get(|_: super::caller::Reader| async move { Json(&*description).into_response() }),
+        get(|_: super::caller::Reader| async move { Json(description()).into_response() }),
     )
+}
+
+/// The description of all routes for programs, as `OpenAPI`.
+pub(super) fn description() -> &'static Value {
+    static DESCRIPTION: LazyLock<Value> = LazyLock::new(|| {
+        let (_, mut description) = described().split_for_parts();
+        // The router's notation for a parameter that may contain `/`.
+        let paths = std::mem::take(&mut description.paths.paths);
+        let named = paths
+            .into_iter()
+            .map(|(path, item)| (path.replace("{*", "{"), item));
+        description.paths.paths = named.collect();
+        serde_json::to_value(description).unwrap_or_default()
+    });
+    &DESCRIPTION
 }
 
 fn described() -> OpenApiRouter<Arc<App>> {
@@ -98,5 +107,5 @@ fn described() -> OpenApiRouter<Arc<App>> {
         .routes(routes!(status::status))
         .routes(routes!(life::healthy))
         .routes(routes!(life::ready))
-        .routes(routes!(life::metrics))
+        .routes(routes!(measures::metrics))
 }

@@ -8,8 +8,8 @@ use utoipa::ToSchema;
 
 use super::answer::answer;
 use crate::{
-    database::shown::{DataStatus, data_status},
-    engine::scrub::due_before_ms,
+    database::shown::{DataStatus, Wait, data_status, waits},
+    engine::{schedule::next_night_ms, scrub::due_before_ms},
     http::{
         app::App,
         caller::Reader,
@@ -29,6 +29,10 @@ struct Status {
     recovering: bool,
     /// Why the configuration of the file is not in force.
     configuration_problem: Option<String>,
+    /// When the next night is due.
+    next_night_utc: Option<Instant>,
+    /// Files for which sites wait.
+    waits: Vec<Wait>,
     /// Its database and its products.
     #[serde(flatten)]
     data: DataStatus,
@@ -44,14 +48,16 @@ struct Status {
 pub(super) async fn status(_: Reader, State(app): State<Arc<App>>) -> Result<Response, Problem> {
     let (config, now_ms) = (app.config(), app.now_ms());
     let before_ms = due_before_ms(&config, now_ms);
-    let data = app
-        .read(move |connection| data_status(connection, before_ms))
+    let (data, waits) = app
+        .read(move |connection| Ok((data_status(connection, before_ms)?, waits(connection)?)))
         .await?;
     let status = Status {
         name: config.name.clone(),
         version: env!("CARGO_PKG_VERSION"),
         recovering: app.shared.is_recovering(),
         configuration_problem: app.shared.problem(),
+        next_night_utc: next_night_ms(&config.schedule, now_ms).map(Instant),
+        waits,
         data,
         at_utc: Instant(now_ms),
     };

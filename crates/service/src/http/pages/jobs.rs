@@ -11,6 +11,7 @@ use serde::Deserialize;
 
 use super::{
     layout::{Page, form_token, operator},
+    log::log_table,
     parts::{Times, lead, more, prose, state, table, times, verdict},
     trend::headline,
 };
@@ -36,7 +37,7 @@ const JOBS: u32 = 100;
 /// Attempts on the page of a job.
 const ATTEMPTS: u32 = 50;
 /// Bytes of the end of a log on the page of a job.
-const TAIL: u64 = 16 << 10;
+const TAIL: u64 = 64 << 10;
 
 /// A filter of jobs.
 #[derive(Debug, Deserialize)]
@@ -174,7 +175,7 @@ pub(super) async fn one(
                         @if log.bytes > TAIL { ", its end" }
                         ". " a href={ "/api/v1/jobs/" (job.id) "/log?attempt=" (newest.n) } { "Whole log" }
                     }
-                    pre tabindex="0" aria-label="Log" { (log.text) }
+                    (log_table(&log.text, log.bytes <= TAIL, newest.ended_utc.is_some()))
                 }
             }
         }

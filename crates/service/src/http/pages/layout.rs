@@ -23,11 +23,12 @@ pub(super) fn style() -> String {
 }
 
 /// Pages linked from every page.
-const PLACES: [(&str, &str); 4] = [
+const PLACES: [(&str, &str); 5] = [
     ("/", "Sites"),
     ("/jobs", "Jobs"),
     ("/kernels", "Kernels"),
     ("/nights", "Nights"),
+    ("/events", "Events"),
 ];
 
 /// A page: its title, and its address in the navigation.
@@ -64,7 +65,7 @@ impl Page<'_> {
             footer {
                 "areograph " (env!("CARGO_PKG_VERSION")) ", " (name) ". Times are UTC"
                 @if config.schedule.zone != "UTC" { ", then " (config.schedule.zone) }
-                ". " a href="/openapi.json" { "Interface for programs" }
+                ". " a href="/docs" { "Interface for programs" }
                 span id="live" role="status" {}
             }
         }

@@ -31,7 +31,7 @@
   const source = new EventSource('/api/v1/events');
   source.onopen = () => { say(' Live.'); soon(); };
   source.onerror = () => say(' Not live: the connection was lost; reconnecting.');
-  for (const kind of ['job', 'stage', 'progress', 'run', 'root', 'night', 'alert', 'config', 'checked', 'lost']) {
+  for (const kind of ['job', 'stage', 'progress', 'run', 'root', 'night', 'alert', 'config', 'checked', 'file', 'fetch', 'lost']) {
     source.addEventListener(kind, soon);
   }
   addEventListener('pagehide', () => source.close());

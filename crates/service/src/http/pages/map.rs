@@ -43,9 +43,11 @@ pub(super) fn map(sites: &[Site]) -> Markup {
                     text x=(LEFT - 6.0) y=(y + 6.0) text-anchor="end" font-size="17" fill="#222222" { (latitude_name(latitude)) }
                 }
                 @for (site, bounds_deg) in &placed {
-                    a href={ "/sites/" (site.name) } aria-label={ (site.name) ": " (site.verdict.as_deref().unwrap_or("no run yet")) } {
+                    @let waits = site.waits_for.is_some();
+                    a href={ "/sites/" (site.name) }
+                        aria-label={ (site.name) ": " (site.verdict.as_deref().unwrap_or("no run yet")) @if waits { ", waits" } } {
                         @for [x, y, wide, high] in rectangles(*bounds_deg) {
-                            rect class={ "site " (tone(site.verdict.as_deref())) } x=(x) y=(y) width=(wide) height=(high) {}
+                            rect class={ "site " (tone(site.verdict.as_deref())) @if waits { " waits" } } x=(x) y=(y) width=(wide) height=(high) {}
                         }
                     }
                 }
@@ -55,6 +57,7 @@ pub(super) fn map(sites: &[Site]) -> Markup {
             }
             figcaption {
                 (counted(placed.len(), "site")) " with windows; east longitude and areocentric latitude. The colour shows the verdict."
+                @if placed.iter().any(|(site, _)| site.waits_for.is_some()) { " A site with a dashed frame waits for an input." }
                 @if sites.len() > placed.len() { " The windows of the other sites are not known yet." }
             }
         }

@@ -1,15 +1,19 @@
 //! Pages for people: complete without the script, which only keeps them up to date.
 
 mod data;
+mod docs;
+mod events;
 mod jobs;
 mod kernels;
 pub(super) mod layout;
+mod log;
 mod login;
 mod map;
 mod nights;
 mod parts;
 mod runs;
 mod sites;
+mod standing;
 mod timeline;
 mod trend;
 
@@ -22,6 +26,7 @@ use axum::{
 };
 
 use super::app::App;
+pub(super) use parts::tone;
 
 /// A file of this version never changes.
 const KEPT: (HeaderName, &str) = (header::CACHE_CONTROL, "public, max-age=31536000, immutable");
@@ -44,6 +49,8 @@ pub(super) fn routes() -> Router<Arc<App>> {
         .route("/jobs/{job}/cancel", post(jobs::cancel_one))
         .route("/jobs/{job}/retry", post(jobs::retry_one))
         .route("/kernels", get(kernels::list))
+        .route("/events", get(events::list))
+        .route("/docs", get(docs::docs))
         .route("/nights", get(nights::list))
         .route("/nights/{night}", get(nights::one))
         .route("/login", get(login::form).post(login::enter))

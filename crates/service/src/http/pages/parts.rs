@@ -2,7 +2,7 @@
 
 use chrono::{DateTime, Utc};
 use chrono_tz::Tz;
-use maud::{Markup, html};
+use maud::{Markup, PreEscaped, html};
 use serde_json::Value;
 
 use crate::{clock::utc_text, http::app::App, instant::Instant, state::JobState};
@@ -63,7 +63,7 @@ impl Times {
 }
 
 /// CSS class of a verdict's colour.
-pub(super) fn tone(verdict: Option<&str>) -> &'static str {
+pub(in crate::http) fn tone(verdict: Option<&str>) -> &'static str {
     match verdict {
         Some("valid") => "valid",
         Some(verdict) if verdict.starts_with("valid") => "remarks",
@@ -93,10 +93,19 @@ pub(super) fn lead(tone: &str, headline: &str, body: &Markup) -> Markup {
     html! { div class={ "verdict " (tone) } { p { strong { (headline) } } (body) } }
 }
 
-/// A table that can be scrolled by keyboard.
+/// A table that can be scrolled by keyboard. On a phone, each row is a card whose cells state their heads.
 pub(super) fn table(caption: &str, heads: &[&str], rows: &Markup) -> Markup {
+    table_of("wide cards", caption, heads, &labelled(&rows.0, heads))
+}
+
+/// A table of many short rows, which remain rows on a phone.
+pub(super) fn log_rows(caption: &str, heads: &[&str], rows: &Markup) -> Markup {
+    table_of("wide log", caption, heads, rows)
+}
+
+fn table_of(class: &str, caption: &str, heads: &[&str], rows: &Markup) -> Markup {
     html! {
-        div class="wide" tabindex="0" role="region" aria-label=(caption) {
+        div class=(class) tabindex="0" role="region" aria-label=(caption) {
             table {
                 caption { (caption) }
                 thead { tr { @for head in heads { th scope="col" { (head) } } } }
@@ -104,6 +113,26 @@ pub(super) fn table(caption: &str, heads: &[&str], rows: &Markup) -> Markup {
             }
         }
     }
+}
+
+/// Rows whose cells carry the head of their column.
+fn labelled(rows: &str, heads: &[&str]) -> Markup {
+    let mut text = String::with_capacity(rows.len() * 2);
+    let mut column = 0;
+    for part in rows.split_inclusive('<') {
+        let name = part.get(..2).unwrap_or_default();
+        let (tag, rest) = part.split_at(if matches!(name, "td" | "th") { 2 } else { 0 });
+        text.push_str(tag);
+        if name == "tr" {
+            column = 0;
+        } else if !tag.is_empty() {
+            let head = heads.get(column).unwrap_or(&"");
+            text.push_str(&html! { (PreEscaped(" data-head=\"")) (head) (PreEscaped("\"")) }.0);
+            column += 1;
+        }
+        text.push_str(rest);
+    }
+    PreEscaped(text)
 }
 
 /// Sentences of a JSON column: a list of texts, or one.
@@ -225,6 +254,12 @@ mod tests {
         ] {
             assert_eq!(times.age(Instant(times.now_ms - ago_ms)), expected);
         }
+        let row = html! { tr { th scope="row" { "a" } td { "1" } } tr { th { time { "b" } } } };
+        assert_eq!(
+            labelled(&row.0, &["A", "B<"]).0,
+            "<tr><th data-head=\"A\" scope=\"row\">a</th><td data-head=\"B&lt;\">1</td></tr>\
+             <tr><th data-head=\"A\"><time>b</time></th></tr>"
+        );
         assert_eq!(figure_name("range_mean_m"), "range mean, m");
         assert_eq!(figure(0.012_345), "0.0123");
         assert_eq!(figure(1.5e-6), "1.50e-6");

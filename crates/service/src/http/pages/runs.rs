@@ -13,7 +13,10 @@ use serde_json::Value;
 use super::{
     jobs::short,
     layout::{Page, form_token, operator},
-    parts::{Times, figure, figure_name, lead, prose, said, sentences, size, table, times, tone},
+    parts::{
+        Times, figure, figure_name, lead, log_rows, prose, said, sentences, size, table, times,
+        tone,
+    },
     trend::{KernelChange, figures, headline},
 };
 use crate::{
@@ -101,8 +104,11 @@ fn run_lead(run: &Run, causes: &[CauseRow], manifest: Option<&Manifest>, times: 
             }
             @if run.damaged > 0 { p { "Products withheld because they do not match the manifest: " (run.damaged) "." } }
             (said(&sentences(&run.reasons)))
-            @for because in sentences(&run.because) { p { "Because: " (prose(&because)) } }
-        @for cause in causes { @if !cause.detail.is_empty() { p { "Because: " (prose(&cause.detail)) } } }
+            @let because = sentences(&run.because);
+            @for because in &because { p { "Because: " (prose(because)) } }
+            @for cause in causes.iter().filter(|cause| !cause.detail.is_empty() && !because.contains(&cause.detail)) {
+                p { "Because: " (prose(&cause.detail)) }
+            }
             @if named(REPORT) { p { a href={ "/api/v1/runs/" (run.id) "/files/" (REPORT) } { "Report" } } }
         },
     )
@@ -187,7 +193,7 @@ fn kernel_table(run: &Run, before: Option<&Run>) -> Markup {
     };
     html! {
         @if let Some(words) = change.as_ref().and_then(KernelChange::words) { p { "Since the previous run: " (words) "." } }
-        (table("Kernels in load order", &["Kernel", "Role", "BLAKE3", "Since the previous run"], &html! {
+        (log_rows("Kernels in load order", &["Kernel", "Role", "BLAKE3", "Since the previous run"], &html! {
             @for kernel in kernels {
                 @let name = text(kernel, "name");
                 tr {
@@ -211,7 +217,7 @@ fn stage_table(run: &Run) -> Markup {
             .to_owned()
     };
     html! {
-        (table("Stages", &["Stage", "Ran", "Why"], &html! {
+        (log_rows("Stages", &["Stage", "Ran", "Why"], &html! {
             @for stage in stages {
                 tr {
                     th scope="row" { (text(stage, "stage")) }
@@ -226,7 +232,7 @@ fn stage_table(run: &Run) -> Markup {
 fn file_table(run: &Run, manifest: &Manifest) -> Markup {
     html! {
         p { a href={ "/api/v1/runs/" (run.id) "/files/" (MANIFEST) } { (MANIFEST) } ": all inputs of these products." }
-        (table("Products", &["File", "Size", "Rows", "BLAKE3"], &html! {
+        (log_rows("Products", &["File", "Size", "Rows", "BLAKE3"], &html! {
             @for product in &manifest.products {
                 tr {
                     th scope="row" { a href={ "/api/v1/runs/" (run.id) "/files/" (product.path) } { (product.path) } }

@@ -11,23 +11,21 @@ use maud::{Markup, html};
 use serde::Deserialize;
 
 use super::{
-    data::{attention, last_scrub},
+    data::last_scrub,
     layout::{Page, form_token, operator},
     map::map,
     parts::{
         Times, figure, figure_name, lead, more, prose, said, state, table, times, tone, verdict,
     },
+    standing::{Faults, standing},
     trend::{figures, headline, trends},
 };
 use crate::{
     database::{
         JobFilter, jobs,
-        shown::{
-            DataStatus, Night, RootFolder, Run, Site, data_status, nights, roots, runs_of_site,
-            site, sites,
-        },
+        shown::{Night, Run, Site, data_status, nights, roots, runs_of_site, site, sites, waits},
     },
-    engine::scrub::due_before_ms,
+    engine::{schedule::next_night_ms, scrub::due_before_ms},
     http::{
         app::App,
         caller::{Caller, Reader},
@@ -35,6 +33,7 @@ use crate::{
         extract::{At, Filled, Parameters, name},
         problem::Problem,
     },
+    instant::Instant,
     state::JobState,
     words::counted,
 };
@@ -60,7 +59,7 @@ pub(super) async fn home(
 ) -> Result<Response, Problem> {
     let after = from.after.unwrap_or_default();
     let before_ms = due_before_ms(&app.config(), app.now_ms());
-    let (found, roots, nights, work, data) = app
+    let (found, roots, waits, nights, work, data) = app
         .read(move |connection| {
             let mut work = Vec::new();
             for state in [
@@ -78,6 +77,7 @@ pub(super) async fn home(
             Ok((
                 sites(connection, &after, SITES + 1)?,
                 roots(connection)?,
+                waits(connection)?,
                 nights(connection, None, 1)?,
                 work,
                 data_status(connection, before_ms)?,
@@ -92,9 +92,12 @@ pub(super) async fn home(
         configuration: app.shared.problem(),
         recovering: app.shared.is_recovering(),
         data: &data,
+        roots: &roots,
+        waits: &waits,
     };
+    let next_ms = next_night_ms(&app.config().schedule, app.now_ms());
     let body = html! {
-        div id="state" data-live="" { (standing(shown, &roots, &faults, &times)) }
+        div id="state" data-live="" { (standing(shown, &faults, &times)) }
         section {
             h2 { "Map" }
             div id="map" data-live="" { (map(shown)) }
@@ -105,8 +108,8 @@ pub(super) async fn home(
             @if let Some(Some(next)) = next { p { a href=(next) rel="next" { "More sites" } } }
         }
         section {
-            h2 { "Last night" }
-            div id="night" data-live="" { (last_night(nights.first(), &times)) (last_scrub(&data.products, &times)) }
+            h2 { "Nights" }
+            div id="night" data-live="" { (last_night(nights.first(), &times)) (next_night(next_ms, &times)) (last_scrub(&data.products, &times)) }
         }
         section {
             h2 { "Work" }
@@ -118,73 +121,6 @@ pub(super) async fn home(
         place: "/",
     }
     .answer(&app, &caller, &body))
-}
-
-/// Faults of the service itself.
-struct Faults<'a> {
-    configuration: Option<String>,
-    recovering: bool,
-    data: &'a DataStatus,
-}
-
-/// The box at the top: what needs attention.
-fn standing(sites: &[Site], roots: &[RootFolder], faults: &Faults<'_>, times: &Times) -> Markup {
-    let problem = faults.configuration.as_deref();
-    let count = |wanted: &str| {
-        sites
-            .iter()
-            .filter(|site| tone(site.verdict.as_deref()) == wanted)
-            .count()
-    };
-    let stale = sites
-        .iter()
-        .filter(|site| site.stale_since_utc.is_some())
-        .count();
-    let away: Vec<&RootFolder> = roots
-        .iter()
-        .filter(|root| root.state == "unavailable")
-        .collect();
-    let wrong: Vec<&Site> = sites.iter().filter(|site| site.problem.is_some()).collect();
-    let refused = sites
-        .iter()
-        .filter(|site| site.newest_valid == Some(false))
-        .count();
-    let worst = if !away.is_empty()
-        || problem.is_some()
-        || !wrong.is_empty()
-        || refused > 0
-        || count("invalid") > 0
-        || faults.recovering
-        || faults.data.products.runs_damaged > 0
-    {
-        "invalid"
-    } else if stale > 0 || count("none") > 0 {
-        "remarks"
-    } else {
-        "valid"
-    };
-    let headline = match (sites.len(), stale) {
-        (0, _) => "No sites yet: put site files into the site folder".to_owned(),
-        (all, 0) => format!("{}, none of them stale", counted(all, "site")),
-        (all, stale) => format!("{}, {stale} of them stale", counted(all, "site")),
-    };
-    lead(
-        worst,
-        &headline,
-        &html! {
-            ul {
-                @for root in &away { li { "The folder " code { (root.path) } " has been unavailable since "
-                    (times.at(root.since_utc)) ": " (root.detail) ". Its sites are suspended; nothing is lost." } }
-                @if let Some(problem) = problem { li { "The changed configuration was rejected; the former \
-                    configuration remains in force: " (problem) } }
-                (attention(faults.data, faults.recovering))
-                @for site in &wrong { li { a href={ "/sites/" (site.name) } { (site.name) } ": " (site.problem.as_deref().unwrap_or_default()) } }
-                @if refused > 0 { li { "The newest run of " (counted(refused, "site")) " is not valid; earlier products stay current." } }
-                @if count("remarks") > 0 { li { (count("remarks")) " valid with remarks." } }
-                @if count("none") > 0 { li { (count("none")) " without a run." } }
-            }
-        },
-    )
 }
 
 fn site_table(sites: &[Site], times: &Times) -> Markup {
@@ -206,7 +142,7 @@ fn site_table(sites: &[Site], times: &Times) -> Markup {
                     td { (verdict(site.verdict.as_deref())) @if site.newest_valid == Some(false) { " " small { "newest run not valid" } } }
                     td { (times.maybe(site.current_since_utc)) }
                     td { @match site.checked_utc { Some(at) => (times.age(at)), None => "never" } }
-                    td class="long" { (freshness(site, times)) }
+                    td class="long" { (brief(site, times)) }
                     td { @if let (Some(job), Some(at)) = (site.job, site.job_state) { a href={ "/jobs/" (job) } { (job) } " " (state(at)) } }
                 }
             }
@@ -214,10 +150,25 @@ fn site_table(sites: &[Site], times: &Times) -> Markup {
     )
 }
 
+/// State of a site in the table of all sites, whose reason is in the box above if several sites may share it.
+fn brief(site: &Site, times: &Times) -> Markup {
+    html! {
+        @match (&site.waits_for, &site.problem) {
+            (Some(what), _) if site.enabled => { span class="word remarks" { "waits" } " for " code { (what) } }
+            (None, Some(_)) if site.enabled => { span class="word invalid" { "not run" } ", see above" }
+            _ => (freshness(site, times)),
+        }
+    }
+}
+
 /// Fresh, or since when and why stale.
 fn freshness(site: &Site, times: &Times) -> Markup {
     html! {
         @if !site.enabled { "Not run: the site file was removed, or disables the site." }
+        @else if site.waits_for.is_some() && let Some(why) = &site.stale_because {
+            "Waits: " (prose(why)) "."
+            @if let Some(since) = site.stale_since_utc { " Stale since " (times.at(since)) "." }
+        }
         @else if let Some(problem) = &site.problem { "Not run: " (problem) }
         @else if let Some(since) = site.stale_since_utc {
             "Stale since " (times.at(since)) ": " (prose(site.stale_because.as_deref().unwrap_or("its inputs changed")))
@@ -243,6 +194,13 @@ fn last_night(night: Option<&Night>, times: &Times) -> Markup {
                 }
             }
         }
+    }
+}
+
+/// The instant of the next night.
+fn next_night(next_ms: Option<i64>, times: &Times) -> Markup {
+    html! {
+        @if let Some(next) = next_ms.map(Instant) { p { "Next night: " (times.at(next)) ", " (times.age(next)) "." } }
     }
 }
 
@@ -301,10 +259,14 @@ pub(super) async fn one(
 }
 
 fn site_lead(site: &Site, newest: Option<&Run>, times: &Times) -> Markup {
-    let headline = site.verdict.as_deref().unwrap_or("no run yet");
+    let verdict = site.verdict.as_deref().unwrap_or("no run yet");
+    let (tone, headline) = match &site.waits_for {
+        Some(what) => ("remarks", format!("{verdict}; waits for {what}")),
+        None => (tone(site.verdict.as_deref()), verdict.to_owned()),
+    };
     lead(
-        tone(site.verdict.as_deref()),
-        headline,
+        tone,
+        &headline,
         &html! {
             p { (freshness(site, times)) }
             @if let Some(run) = &site.current_run {

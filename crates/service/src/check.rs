@@ -1,0 +1,199 @@
+//! What a service would meet at its start, without starting one: nothing is created or changed.
+
+use std::{
+    fs::{self, File, TryLockError},
+    net::TcpListener,
+    path::{Path, PathBuf},
+};
+
+use rustix::fs::{Access, access};
+
+use super::{
+    clock::minute_text,
+    database::{Layout, look_at},
+    engine::{
+        disk::free_mib,
+        folders::{Folder, folders},
+        hooks::program_of,
+        schedule::next_night_ms,
+    },
+    lock::{LOCK, owner_of, refuse_network},
+    recover::refuse_foreign,
+    start::never_seen,
+    words::counted,
+};
+use areograph_base::error::{Cause, IoError, Locate as _, Result};
+use areograph_config::ServiceConfig;
+
+/// One subject of a check.
+#[derive(Debug)]
+pub struct Finding {
+    /// The subject in a word.
+    pub subject: &'static str,
+    /// Where it is: a file, a folder, an address.
+    pub place: String,
+    /// What was found, or the fault.
+    pub found: Result<String>,
+    /// Whether a fault stops a service from starting; otherwise it starts, and the subject does not work.
+    pub stops: bool,
+}
+
+/// Faults that a service reports only once it needs the subject.
+#[derive(Debug, thiserror::Error, Cause)]
+enum Fault {
+    #[error("the folder cannot be written by this user")]
+    #[cause(Io: "give the folder to the user of the service, or name another folder in [outputs]")]
+    NotWritable,
+    #[error(
+        "{left_mib} MiB are free, less than workers.min_free_mib = {least_mib}: no site would start"
+    )]
+    #[cause(Io: "free some space, or lower workers.min_free_mib")]
+    NoRoom { left_mib: u64, least_mib: u64 },
+    #[error("the program {0} of a hook is not an executable file")]
+    #[cause(Configuration: "correct hooks.command, or make the file executable")]
+    NoProgram(String),
+}
+
+/// Examines what the configuration names, in the order in which a service needs it.
+#[must_use]
+pub fn check(config: &ServiceConfig, now_ms: i64) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    let mut note = |subject, place: &dyn ToString, stops, found: Result<String>| {
+        findings.push(Finding {
+            subject,
+            place: place.to_string(),
+            found,
+            stops,
+        });
+    };
+    let next = next_night_ms(&config.schedule, now_ms).map(minute_text);
+    let next = next.map_or_else(String::new, |next| format!("the next night is {next}"));
+    note("schedule", &config.schedule.cron, true, Ok(next));
+    let (state, products) = (&config.outputs.state, &config.outputs.products);
+    let running = running(state);
+    note("state", &state.display(), true, state_folder(state));
+    note("products", &products.display(), true, writable(products));
+    let database = look_at(state);
+    let known = match &database {
+        Ok(Some(seen)) => seen.roots.clone(),
+        _ => Vec::new(),
+    };
+    let layout = database.and_then(|seen| {
+        let identity = seen.as_ref().and_then(|seen| seen.identity.as_deref());
+        if products.is_dir() {
+            refuse_foreign(identity, products).in_file(state)?;
+        }
+        Ok(match seen.map(|seen| seen.layout) {
+            None => "none yet: the first start creates it".to_owned(),
+            Some(Layout::Present(layout)) => format!("layout {layout}"),
+            Some(Layout::Former(layout)) => {
+                format!("layout {layout}: the next start copies and migrates it")
+            }
+        })
+    });
+    note("database", &state.display(), true, layout);
+    for folder in folders(&config.inputs).unwrap_or_default() {
+        let is_known = known.contains(&folder.path);
+        let (stops, found) = input_folder(&folder, is_known, &config.file);
+        note(folder.kind.name(), &folder.path, stops, found);
+    }
+    for folder in [products, state] {
+        let least_mib = u64::from(config.workers.min_free_mib);
+        let room = free_mib(&above(folder)).map_or_else(
+            || Ok("the system does not report the free space".to_owned()),
+            |left_mib| {
+                if left_mib < least_mib {
+                    let fault = Fault::NoRoom {
+                        left_mib,
+                        least_mib,
+                    };
+                    return Err(fault).in_file(folder);
+                }
+                Ok(format!("{left_mib} MiB free"))
+            },
+        );
+        note("disk", &folder.display(), false, room);
+    }
+    for hook in &config.hooks {
+        let named = hook.command.first().map_or("", |program| program);
+        let found = program_of(named).ok_or_else(|| Fault::NoProgram(named.to_owned()));
+        let found = found.map(|path| format!("starts {}", path.display()));
+        note("hook", &named, false, found.in_file(&config.file));
+    }
+    let address = config.http.listen;
+    match running {
+        Some(owner) => note("service", &address, false, Ok(format!("runs now: {owner}"))),
+        None => note("port", &address, true, port(config)),
+    }
+    findings
+}
+
+/// The service that uses a state folder now.
+fn running(state: &Path) -> Option<String> {
+    let path = state.join(LOCK);
+    match File::open(&path).ok()?.try_lock_shared() {
+        Err(TryLockError::WouldBlock) => Some(owner_of(&path).map_or_else(
+            || "a process that does not state its number".to_owned(),
+            |owner| owner.words(),
+        )),
+        _ => None,
+    }
+}
+
+fn state_folder(state: &Path) -> Result<String> {
+    refuse_network(&above(state)).in_file(state)?;
+    writable(state)
+}
+
+/// The folder, or the first existing one above it.
+fn above(folder: &Path) -> PathBuf {
+    let existing = folder.ancestors().find(|above| above.exists());
+    existing.unwrap_or(Path::new("/")).to_owned()
+}
+
+fn writable(folder: &Path) -> Result<String> {
+    let existing = above(folder);
+    if !existing.is_dir() {
+        let error = std::io::Error::from(std::io::ErrorKind::NotADirectory);
+        return Err(IoError::on("create the folder")(error)).in_file(folder);
+    }
+    if access(&existing, Access::WRITE_OK | Access::EXEC_OK).is_err() {
+        return Err(Fault::NotWritable).in_file(existing);
+    }
+    let text = if existing == folder {
+        "writable"
+    } else {
+        "does not exist yet: the first start creates it"
+    };
+    Ok(text.to_owned())
+}
+
+/// A folder of inputs, and whether its fault stops a service. One that was available before may be away.
+fn input_folder(folder: &Folder, is_known: bool, file: &Path) -> (bool, Result<String>) {
+    let path = Path::new(&folder.path);
+    if !path.is_dir() {
+        if is_known {
+            return (
+                false,
+                Ok("away: its sites wait until it is back".to_owned()),
+            );
+        }
+        return (true, Err(never_seen(folder)).in_file(file));
+    }
+    let listed = fs::read_dir(path)
+        .map_err(IoError::on("list the folder"))
+        .in_file(path);
+    let found = listed.map(|entries| match entries.count() {
+        0 => "empty".to_owned(),
+        count => counted(count, "item"),
+    });
+    (false, found)
+}
+
+fn port(config: &ServiceConfig) -> Result<String> {
+    let address = config.http.listen;
+    TcpListener::bind(address)
+        .map_err(IoError::on("listen at the address"))
+        .in_file(address.to_string())?;
+    Ok("free".to_owned())
+}
