@@ -144,10 +144,11 @@ pub fn main_of(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>)
 /// Starts the log.
 fn log(cli: &Cli) {
     // The log is the only account of an unattended command.
-    let unattended = matches!(
-        cli.command,
-        Command::Worker(_) | Command::Serve(_) | Command::Nightly(_)
-    );
+    let unattended = match &cli.command {
+        Command::Worker(_) | Command::Nightly(_) => true,
+        Command::Serve(arguments) => arguments.init.is_none(),
+        _ => false,
+    };
     let level = match (unattended, cli.verbose, cli.log.is_some()) {
         _ if cli.quiet => LevelFilter::ERROR,
         (false, 0, false) => LevelFilter::WARN,

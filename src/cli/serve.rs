@@ -17,7 +17,7 @@ use tokio::{
     time::{interval, sleep},
 };
 
-use super::{output, panicked::flatten, report};
+use super::{output, panicked::flatten, progress::Progress, report};
 use crate::{
     config::{Document as _, ServiceConfig},
     error::{Cause, Error, IoError, Locate as _},
@@ -49,7 +49,7 @@ pub(super) struct Arguments {
     config: Option<PathBuf>,
     /// Write a synthetic mission and a configuration for it into this folder, and exit.
     #[arg(long, value_name = "DIR")]
-    init: Option<PathBuf>,
+    pub(super) init: Option<PathBuf>,
     /// Listen at this address instead of the configured one; port 0 selects a free port.
     #[arg(long, value_name = "ADDRESS:PORT", conflicts_with = "init")]
     listen: Option<SocketAddr>,
@@ -78,7 +78,11 @@ fn init(folder: &Path) -> Result<(), Error> {
     if path.exists() {
         return Err(Exists).in_file(path);
     }
-    write_scene(folder, &SceneOptions::default())?;
+    let progress = Progress::of_work("serve");
+    progress.watch("writing a mission", |_| {
+        write_scene(folder, &SceneOptions::default())
+    })?;
+    drop(progress);
     atomic::write(&path, demonstration().as_bytes())?;
     let [later, used] = write_later_orbit(folder)?;
     let (folder, path) = (folder.display(), path.display());

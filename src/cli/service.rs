@@ -3,9 +3,10 @@
 mod check;
 mod init;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand, ValueEnum};
+use serde_json::json;
 
 use super::output;
 use crate::{
@@ -80,6 +81,9 @@ enum TokenCommand {
     List {
         /// Configuration of the service (TOML).
         config: PathBuf,
+        /// Print JSON.
+        #[arg(long)]
+        json: bool,
     },
     /// Revoke a token, and the sessions that were started with it.
     #[command(after_help = "Example: areograph service token revoke areograph.toml 01234567")]
@@ -143,7 +147,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     }
 }
 
-fn load(path: &std::path::Path) -> Result<ServiceConfig, Error> {
+fn load(path: &Path) -> Result<ServiceConfig, Error> {
     Ok(ServiceConfig::load(path)?.config)
 }
 
@@ -175,25 +179,7 @@ fn token(command: &TokenCommand) -> Result<(), Error> {
             output::line(made.in_file(config)?);
             Ok(())
         }
-        TokenCommand::List { config } => {
-            let found = existing(&load(config)?)?.read(tokens).in_file(config)?;
-            for token in found {
-                let ends = match (token.revoked_ms, token.expires_ms) {
-                    (Some(at_ms), _) => format!("revoked {}", utc_text(at_ms)),
-                    (None, Some(at_ms)) => format!("until {}", utc_text(at_ms)),
-                    (None, None) => "no expiry".to_owned(),
-                };
-                let used = token.used_ms.map_or_else(
-                    || "never used".to_owned(),
-                    |at_ms| format!("used {}", utc_text(at_ms)),
-                );
-                output::line(format_args!(
-                    "{}  {:7}  {ends}  {used}  {}",
-                    token.id, token.role, token.note
-                ));
-            }
-            Ok(())
-        }
+        TokenCommand::List { config, json } => list(config, *json),
         TokenCommand::Revoke { config, id } => {
             let revoked = existing(&load(config)?)?
                 .write(|transaction| revoke_token(transaction, now_ms, id))
@@ -205,4 +191,40 @@ fn token(command: &TokenCommand) -> Result<(), Error> {
             Err(Unfit::NoToken(id.clone()).into())
         }
     }
+}
+
+/// Prints the tokens.
+fn list(config: &Path, as_json: bool) -> Result<(), Error> {
+    let found = existing(&load(config)?)?.read(tokens).in_file(config)?;
+    if as_json {
+        let tokens = found.iter().map(|token| {
+            json!({
+                "id": token.id,
+                "role": token.role.to_string(),
+                "note": token.note,
+                "created_utc": utc_text(token.created_ms),
+                "expires_utc": token.expires_ms.map(utc_text),
+                "revoked_utc": token.revoked_ms.map(utc_text),
+                "used_utc": token.used_ms.map(utc_text),
+            })
+        });
+        output::json(&tokens.collect());
+        return Ok(());
+    }
+    for token in found {
+        let ends = match (token.revoked_ms, token.expires_ms) {
+            (Some(at_ms), _) => format!("revoked {}", utc_text(at_ms)),
+            (None, Some(at_ms)) => format!("until {}", utc_text(at_ms)),
+            (None, None) => "no expiry".to_owned(),
+        };
+        let used = token.used_ms.map_or_else(
+            || "never used".to_owned(),
+            |at_ms| format!("used {}", utc_text(at_ms)),
+        );
+        output::line(format_args!(
+            "{}  {:7}  {ends}  {used}  {}",
+            token.id, token.role, token.note
+        ));
+    }
+    Ok(())
 }
