@@ -1,5 +1,9 @@
 //! Support data of a camera that does not fly along its x axis, so that no line sees a point.
-#![allow(clippy::unwrap_used, reason = "helpers of tests may fail loudly")]
+#![allow(
+    clippy::disallowed_methods,
+    clippy::unwrap_used,
+    reason = "tests work in temporary folders, and their helpers may fail loudly"
+)]
 
 use std::fs;
 
