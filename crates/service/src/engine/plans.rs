@@ -324,6 +324,10 @@ impl Context<'_> {
         let pending = pending_job(connection, &site.name)?.is_some();
         Ok(match &site.current_run {
             None if site.round == 0 && !pending => (CauseKind::First, "the site is new"),
+            Some(_) if site.round == 0 => (
+                CauseKind::ToolChanged,
+                "this build of areograph computes stages differently",
+            ),
             _ if self.night.is_some() => (
                 CauseKind::Scheduled,
                 "the products do not correspond to the inputs",
