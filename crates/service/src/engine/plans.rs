@@ -427,6 +427,7 @@ fn differences(before: &[SiteInput], now: &[SiteInput], at_ms: i64) -> Vec<Cause
         };
         let name = areograph_store::files::file_name(Path::new(path));
         let what = match (&old_blake3, &new_blake3) {
+            (None, _) if old.is_some() => "is back",
             (None, _) => "is new",
             (_, None) => "was removed, or is no longer read",
             _ => "changed",
