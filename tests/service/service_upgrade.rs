@@ -170,7 +170,7 @@ impl Service {
         }
         database
             .execute_batch(&format!(
-                "UPDATE run SET version = '{EARLIER}'; UPDATE fact SET value = '{EARLIER}' WHERE value = '{PRESENT}';
+                "UPDATE run SET version = '{EARLIER}'; UPDATE fact SET value = '{EARLIER}' WHERE value LIKE '{PRESENT} %';
                  PRAGMA user_version = 1"
             ))
             .unwrap();

@@ -1,7 +1,7 @@
 //! Reconciliation after a start: workers of an earlier service are ended, their publications are adopted, the rest is
 //! queued again. Links on the disk take precedence over the database.
 
-use std::path::Path;
+use std::{fs::File, path::Path};
 
 use serde_json::{Value, json};
 
@@ -173,15 +173,46 @@ fn note<W: Workers>(core: &Core<W>, published: &Published) -> Stored<()> {
     })
 }
 
-/// With another version of areograph every site is planned again.
-fn new_version<W: Workers>(core: &Core<W>) -> Stored<()> {
+/// Version and content of a program: another build of the same version may compute differently.
+fn build_of(program: &Path) -> String {
     let version = env!("CARGO_PKG_VERSION");
+    let mut content = blake3::Hasher::new();
+    let read = File::open(program).and_then(|file| content.update_reader(file).map(|_| ()));
+    match read {
+        Ok(()) => format!("{version} {}", content.finalize().to_hex()),
+        Err(_) => version.to_owned(),
+    }
+}
+
+/// With another version or build of areograph every site is planned again.
+fn new_version<W: Workers>(core: &Core<W>) -> Stored<()> {
+    let build = build_of(&core.shared.program);
     core.shared.write(|transaction| {
         let before = facts::fact(transaction, facts::TOOL_VERSION)?;
-        if before.as_deref() != Some(version) {
+        if before.as_deref() != Some(&build) {
             transaction.execute("UPDATE site SET round = 0", [])?;
-            facts::note(transaction, facts::TOOL_VERSION, version)?;
+            facts::note(transaction, facts::TOOL_VERSION, &build)?;
         }
         Ok(())
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    #[allow(clippy::disallowed_methods, reason = "programs of a test")]
+    fn two_builds_of_one_version_differ() {
+        let folder = tempfile::tempdir().unwrap();
+        let builds = ["one", "other", "one"].map(|content| {
+            let program = folder.path().join("areograph");
+            std::fs::write(&program, content).unwrap();
+            build_of(&program)
+        });
+        assert!(builds[0] != builds[1] && builds[0] == builds[2]);
+        let version = env!("CARGO_PKG_VERSION");
+        assert!(builds[0].starts_with(&format!("{version} ")));
+        assert_eq!(build_of(&folder.path().join("none")), version);
+    }
 }

@@ -324,6 +324,10 @@ impl Context<'_> {
         let pending = pending_job(connection, &site.name)?.is_some();
         Ok(match &site.current_run {
             None if site.round == 0 && !pending => (CauseKind::First, "the site is new"),
+            Some(_) if site.round == 0 => (
+                CauseKind::ToolChanged,
+                "this build of areograph computes stages differently",
+            ),
             _ if self.night.is_some() => (
                 CauseKind::Scheduled,
                 "the products do not correspond to the inputs",
@@ -423,6 +427,7 @@ fn differences(before: &[SiteInput], now: &[SiteInput], at_ms: i64) -> Vec<Cause
         };
         let name = areograph_store::files::file_name(Path::new(path));
         let what = match (&old_blake3, &new_blake3) {
+            (None, _) if old.is_some() => "is back",
             (None, _) => "is new",
             (_, None) => "was removed, or is no longer read",
             _ => "changed",

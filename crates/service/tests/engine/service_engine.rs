@@ -225,6 +225,8 @@ fn a_lost_file_holds_its_site_until_it_comes() {
     life.go_on(&world, 60, 15);
     let last = later_jobs(&life).pop().unwrap();
     assert_eq!(last, ("b".to_owned(), JobState::Superseded));
+    let why = life.ask("SELECT outcome FROM job WHERE state = 'superseded'");
+    assert!(why[0].contains("`b.bsp` is back"), "{why:?}");
 }
 
 #[test]
