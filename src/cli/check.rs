@@ -1,10 +1,10 @@
 //! `areograph check`.
 
-use std::path::PathBuf;
+use std::{path::PathBuf, sync::atomic::AtomicBool};
 
 use clap::Args;
 
-use super::{load_sites, output, progress::Progress, stop::Signals};
+use super::{load_sites, output, progress::Progress};
 use crate::{
     error::{Error, Kind},
     flow::{Checked, Extent, PUBLISH, RunOptions, check_answer, check_out, check_site},
@@ -25,7 +25,7 @@ pub(super) struct Arguments {
     /// Site files (TOML), folders or globs of them.
     #[arg(required = true, value_name = "SITE.toml")]
     sites: Vec<PathBuf>,
-    /// Compute every stage for the verdict of a run, unless products are up to date; nothing is written.
+    /// Compute every stage for the verdict of a run, unless products are up to date; no product is written.
     #[arg(long)]
     full: bool,
     /// Folder of products of a run, which must be apart from the inputs; kernels that a run into it has read are not read
@@ -41,10 +41,9 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
-    let (hashes, signals) = (
-        HashCache::in_folder(&arguments.out, arguments.rehash),
-        Signals::heard()?,
-    );
+    let hashes = HashCache::in_folder(&arguments.out, arguments.rehash);
+    // A signal ends the command at once: it writes no product.
+    let never = AtomicBool::new(false);
     let extent = if arguments.full {
         Extent::Full
     } else {
@@ -58,7 +57,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
             out: arguments.out.clone(),
             until: PUBLISH,
             force: false,
-            stop: signals.stop(),
+            stop: &never,
             hashes: &hashes,
             roots: &[],
             observer: &progress,
@@ -104,7 +103,7 @@ fn print(site: &str, checked: &Checked) {
     };
     let word = verdict.word();
     output::line(if checked.has_products {
-        format!("  products are up to date and {word}")
+        format!("  products are up to date; verdict: {word}")
     } else {
         format!("  a run would be {word}")
     });

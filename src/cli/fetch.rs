@@ -10,7 +10,7 @@ use clap::{Args, ValueEnum};
 use self::wish::needs;
 use super::{
     stop::Signals,
-    windows::{BoxMeaning, edges},
+    windows::{BOX, BoxMeaning, edges},
 };
 use crate::{
     error::{Error, Kind as ErrorKind, Result},
@@ -57,7 +57,7 @@ pub(super) struct Arguments {
     dates: Vec<[crate::fetch::Utc; 2]>,
     /// West, east, south and north edge, degrees (longitudes -360 to 360): a table of the shots in this box, from the
     /// Orbital Data Explorer.
-    #[arg(long = "box", value_name = "W,E,S,N", value_parser = edges, allow_hyphen_values = true)]
+    #[arg(id = BOX, long, value_name = "W,E,S,N", value_parser = edges, allow_hyphen_values = true)]
     edges_deg: Option<[f64; 4]>,
     #[command(flatten)]
     meaning: BoxMeaning,

@@ -2,7 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::error::{Cause, IoError, Locate as _, Result};
+use crate::{
+    config::{DEPTH_MAX, PEDR_ENDINGS, SHOT_TABLE_ENDINGS, TIE_ENDINGS, files_in},
+    error::{Cause, IoError, Locate as _, Result},
+};
 
 /// A kind of files.
 pub(super) struct FileKind {
@@ -23,13 +26,13 @@ pub(super) const CONFIGURATIONS: FileKind = FileKind {
 /// Files of the laser.
 pub(super) const PEDR_FILES: FileKind = FileKind {
     what: "PEDR file",
-    endings: &["b"],
+    endings: PEDR_ENDINGS,
     below: true,
 };
 /// Tables of the Orbital Data Explorer.
 pub(super) const SHOT_TABLES: FileKind = FileKind {
     what: "table of shots",
-    endings: &["csv", "tab"],
+    endings: SHOT_TABLE_ENDINGS,
     below: true,
 };
 /// Labels apart from images.
@@ -47,7 +50,7 @@ pub(super) const IMAGES: FileKind = FileKind {
 /// Tie points.
 pub(super) const TIES: FileKind = FileKind {
     what: "tie point file",
-    endings: &["csv", "net", "pvl"],
+    endings: TIE_ENDINGS,
     below: true,
 };
 /// Reasons why a path stands for no file.
@@ -62,7 +65,7 @@ enum NoFiles {
     #[error("the glob matches no {0}")]
     #[cause(Input: "check the path")]
     Glob(&'static str),
-    #[error("is not a glob: {0}")]
+    #[error("malformed glob: {0}")]
     #[cause(Configuration: "write *, ? or [..], or name the files")]
     Malformed(glob::PatternError),
 }
@@ -98,15 +101,8 @@ pub(super) fn exist(paths: &[PathBuf]) -> Result<()> {
 }
 
 fn in_folder(folder: &Path, kind: &FileKind) -> Result<Vec<PathBuf>> {
-    std::fs::read_dir(folder).map_err(IoError::on("list"))?;
-    let pattern = glob::Pattern::escape(&folder.to_string_lossy());
-    let pattern = Path::new(&pattern).join(if kind.below { "**/*" } else { "*" });
-    let mut files = globbed(&pattern)?;
-    files.retain(|path| {
-        let ending = path.extension().unwrap_or_default();
-        let mut endings = kind.endings.iter();
-        endings.any(|one| ending.eq_ignore_ascii_case(one))
-    });
+    let depth = if kind.below { DEPTH_MAX } else { 0 };
+    let files = files_in(folder, kind.endings, depth).map_err(IoError::on("list"))?;
     if files.is_empty() {
         return Err(NoFiles::Folder {
             what: kind.what,
@@ -117,16 +113,8 @@ fn in_folder(folder: &Path, kind: &FileKind) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
+/// The files that a glob matches, sorted.
 fn matched(pattern: &Path, kind: &FileKind) -> Result<Vec<PathBuf>> {
-    let files = globbed(pattern)?;
-    if files.is_empty() {
-        return Err(NoFiles::Glob(kind.what).into());
-    }
-    Ok(files)
-}
-
-/// The files that match, sorted.
-fn globbed(pattern: &Path) -> Result<Vec<PathBuf>> {
     let found = glob::glob(&pattern.to_string_lossy()).map_err(NoFiles::Malformed)?;
     let mut files = Vec::new();
     for entry in found {
@@ -134,6 +122,9 @@ fn globbed(pattern: &Path) -> Result<Vec<PathBuf>> {
         if path.is_file() {
             files.push(path);
         }
+    }
+    if files.is_empty() {
+        return Err(NoFiles::Glob(kind.what).into());
     }
     Ok(files)
 }
@@ -173,7 +164,7 @@ mod tests {
         for (wrong, expected) in [
             ("year[1]", "the folder contains no label (*.lbl)"),
             ("*.txt", "the glob matches no label"),
-            ("***", "is not a glob"),
+            ("***", "malformed glob"),
         ] {
             let failure = named(&[path(wrong)], &LABELS).unwrap_err();
             assert!(failure.contains(expected), "{failure}");

@@ -14,7 +14,7 @@ use clap::Args;
 use self::answers::Answers;
 use super::{
     output,
-    windows::{BoxMeaning, edges},
+    windows::{BOX, BoxMeaning, edges},
 };
 use crate::{
     config::{Document as _, SITE_IDENTIFIER, SiteConfig, built_in_instruments},
@@ -49,7 +49,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "TEXT")]
     description: Option<String>,
     /// West, east, south and north edge of the window, degrees (longitudes -360 to 360).
-    #[arg(long = "box", value_name = "W,E,S,N", value_parser = edges, allow_hyphen_values = true)]
+    #[arg(id = BOX, long, value_name = "W,E,S,N", value_parser = edges, allow_hyphen_values = true)]
     edges_deg: Option<[f64; 4]>,
     #[command(flatten)]
     meaning: BoxMeaning,

@@ -128,8 +128,10 @@ fn sentence(stages: &[StageReason]) -> String {
         causes.push(format!("{more} more causes (-v)"));
     }
     let (run, all) = (run.len(), stages.len());
-    let verb = if run == 1 { "stage" } else { "stages" };
-    format!("{run} of {all} {verb} would run: {}", causes.join(", "))
+    let noun = if all == 1 { "stage" } else { "stages" };
+    let causes = causes.join(", ");
+    let colon = if causes.is_empty() { "" } else { ": " };
+    format!("{run} of {all} {noun} would run{colon}{causes}")
 }
 
 /// Prints the plan of every task.

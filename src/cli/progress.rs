@@ -130,7 +130,8 @@ impl Progress {
         work(Watch::counted(&AtomicBool::new(false), &counter))
     }
 
-    fn show(&self, text: String) {
+    /// Shows what is being done.
+    pub(super) fn show(&self, text: String) {
         if let Some(lines) = &self.lines {
             lines.show(&text);
         }
@@ -154,7 +155,10 @@ impl Lines {
         let (name, shown) = (name.to_owned(), Arc::clone(&text));
         let thread = thread::spawn(move || {
             while ended.recv_timeout(LINE_EVERY) == Err(RecvTimeoutError::Timeout) {
-                let text = shown.lock().unwrap_or_else(PoisonError::into_inner);
+                let text = shown.lock().unwrap_or_else(PoisonError::into_inner).clone();
+                if text.is_empty() {
+                    continue;
+                }
                 // A closed standard error is not a failure.
                 let _ = writeln!(io::stderr().lock(), "{name}: {text}");
             }
@@ -261,6 +265,7 @@ pub(super) fn duration(seconds: f64) -> String {
 impl Drop for Progress {
     fn drop(&mut self) {
         self.line.finish_and_clear();
+        self.lines.take();
         let taken_s = self.begun.elapsed().as_secs_f64();
         if self.is_shown && taken_s >= TIME_FROM_S {
             // A closed standard error is not a failure.

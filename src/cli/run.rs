@@ -217,7 +217,10 @@ fn print_outcome(outcome: &RunOutcome) {
         "{site}: {}; {what} in {folder}, see report/index.html",
         verdict.word()
     ));
-    output::line(format_args!("  {}", contents(manifest)));
+    let contents = contents(manifest);
+    if !contents.is_empty() {
+        output::line(format_args!("  {contents}"));
+    }
     for reason in verdict.reasons.iter().chain(&verdict.remarks) {
         output::line(format_args!("  {reason}"));
     }
@@ -242,7 +245,7 @@ fn contents(manifest: &Manifest) -> String {
     if count("registered") > 0 {
         let (inside, all) = (count("registered_inside"), count("registered"));
         parts.push(format!(
-            "{inside} of {all} registered places inside an image"
+            "{inside} of {all} projected footprints inside an image"
         ));
     }
     let has = |name: &&&str| {
@@ -250,7 +253,8 @@ fn contents(manifest: &Manifest) -> String {
         products.any(|product| product.path == ***name)
     };
     let principal = ["registered_footprints.parquet", "footprints.parquet"];
-    let file = principal.iter().find(has);
+    let mut principal = principal.iter();
+    let file = principal.find(has).filter(|_| count("footprints") > 0);
     let file = file.map_or_else(String::new, |file| format!("; see {file}"));
     format!("{}{file}", parts.join(", "))
 }

@@ -15,11 +15,14 @@ use crate::{
 /// Digits after the point of a converted edge, degrees: less than 0.1 mm.
 const EDGE_DIGITS: i32 = 9;
 
+/// The option of a box, which the options on its edges require.
+pub(super) const BOX: &str = "box";
+
 /// Windows of a search.
 #[derive(Debug, Args)]
 pub(super) struct WindowArguments {
     /// West, east, south and north edge, degrees (longitudes -360 to 360; west above east crosses 0 or 180).
-    #[arg(long = "box", value_name = "W,E,S,N", value_parser = edges, allow_hyphen_values = true)]
+    #[arg(id = BOX, long, value_name = "W,E,S,N", value_parser = edges, allow_hyphen_values = true)]
     boxes: Vec<[f64; 4]>,
     #[command(flatten)]
     meaning: BoxMeaning,
@@ -35,13 +38,13 @@ pub(super) struct WindowArguments {
 #[derive(Debug, Clone, Copy, Default, Args)]
 pub(super) struct BoxMeaning {
     /// Direction in which the longitudes of --box increase.
-    #[arg(long, value_name = "SENSE", value_enum, default_value_t)]
+    #[arg(long, value_name = "SENSE", value_enum, default_value_t, requires = BOX)]
     longitude: Sense,
     /// Kind of the latitudes of --box.
-    #[arg(long, value_name = "KIND", value_enum, default_value_t)]
+    #[arg(long, value_name = "KIND", value_enum, default_value_t, requires = BOX)]
     latitude: Latitude,
     /// Accept a box wider than 180 degrees; without this option it is refused, since its edges may have been exchanged.
-    #[arg(long)]
+    #[arg(long, requires = BOX)]
     wide: bool,
 }
 
@@ -63,14 +66,13 @@ enum Latitude {
 
 /// A box whose edges may have been exchanged.
 #[derive(Debug, thiserror::Error, Cause)]
-#[error(
-    "the box spans {width_deg}° eastward, from {west_deg}° to {east_deg}°; expected at most 180°"
-)]
+#[error("the box spans {width_deg}° eastward, from {west} to {east}; expected at most 180°")]
 #[cause(Configuration: "exchange west and east for the other {}°, or give --wide", 360.0 - width_deg)]
 struct Wide {
     width_deg: f64,
-    west_deg: f64,
-    east_deg: f64,
+    /// Edges as written.
+    west: f64,
+    east: f64,
 }
 
 impl BoxMeaning {
@@ -103,8 +105,8 @@ impl BoxMeaning {
         match suspicious_width_deg([west_deg, east_deg]) {
             Some(width_deg) if !self.wide => Err(Wide {
                 width_deg,
-                west_deg,
-                east_deg,
+                west,
+                east,
             }
             .into()),
             _ => Ok(edges_deg),

@@ -212,8 +212,10 @@ impl<'a> Check<'a> {
         let counter = Counter::new(&tell);
         let begun = Instant::now();
         let made = stage.run_watched(Watch::counted(self.stop, &counter));
-        self.observer
-            .hear(label, &StageEvent::Done(begun.elapsed().as_secs_f64()));
+        if made.is_ok() {
+            let taken_s = begun.elapsed().as_secs_f64();
+            self.observer.hear(label, &StageEvent::Done(taken_s));
+        }
         made
     }
 

@@ -42,9 +42,12 @@ pub(super) fn read_back(
                 &Session::open(&session)?,
                 times,
                 orientation,
-                readers.convention(orientation.light_time.convention),
+                readers.reading(
+                    orientation.light_time.convention,
+                    &times.instrument,
+                    &config.pointing,
+                ),
                 &config.kernels,
-                &config.pointing,
             );
             let [position, _] = own;
             same.in_file(position)?;

@@ -43,7 +43,7 @@ use areograph::{
     stages::{
         group_profiles::group_profiles,
         sample_orientation::{Orientation, sample_orientation},
-        tabulate_kernels::{AdjustedTables, require_same, tabulate_kernels},
+        tabulate_kernels::{AdjustedTables, KernelReading, require_same, tabulate_kernels},
         tag_times::{ImageTimes, StartFrom, tag_times},
     },
     time::{Et, PointingBias},
@@ -527,13 +527,13 @@ fn adjusted_kernels_are_of_the_spacecraft_of_the_image() {
         let session = Session::open(&originals).unwrap();
         let (times, orientation) = oriented(&session, &folder, 120);
         let kernels = kernels(&folder);
-        let readers = LightTime::Centre;
+        let reading = KernelReading::of_isis(&times.instrument);
         let own = tabulate_kernels(
             &session,
             &[&times],
             0,
             &orientation,
-            readers,
+            reading,
             &kernels,
             &NO_BIAS,
         );
@@ -558,16 +558,8 @@ fn adjusted_kernels_are_of_the_spacecraft_of_the_image() {
     let own = KernelReaders::Run.paths(&times.id);
     let own = own.map(|name| out.path().join(name));
     let session = Session::open(&originals.followed_by(&own).unwrap()).unwrap();
-    let readers = LightTime::Centre;
-    require_same(
-        &session,
-        &times,
-        &orientation,
-        readers,
-        &kernels(&folder),
-        &NO_BIAS,
-    )
-    .unwrap();
+    let reading = KernelReading::of_isis(&times.instrument);
+    require_same(&session, &times, &orientation, reading, &kernels(&folder)).unwrap();
     let count = originals.kernels().len();
     let of_image = session.of(times.instrument.spacecraft);
     let held = &of_image.coverage().unwrap().per_kernel;

@@ -256,7 +256,8 @@ const READING: [&str; 5] = ["read", "open", "list", "look", "find"];
 
 impl Cause for IoError {
     fn kind(&self) -> Kind {
-        let is_read = READING.iter().any(|verb| self.action.starts_with(verb));
+        let verb = self.action.split(' ').next().unwrap_or_default();
+        let is_read = READING.contains(&verb) && !self.action.contains("temporary");
         if is_read && self.source.kind() == std::io::ErrorKind::NotFound {
             // Like a wrong file: only new input helps.
             Kind::Input

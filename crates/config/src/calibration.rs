@@ -22,7 +22,7 @@ use super::{
         Switch, above_to, any_text, from_to, identifier, lower_case_identifier, whole_from_to,
         words,
     },
-    paths::{FILE, Globs},
+    paths::{FILE, Globs, PEDR_ENDINGS},
     pedr::ground_radius,
 };
 
@@ -219,7 +219,7 @@ declare_table! {
     pub struct CalibrationLaserConfig {
         /// Paths or globs of PEDR files.
         #[serde(skip)]
-        files: Vec<PathBuf> = key(Globs(&["b"])).or(Vec::new()).unused(r#"["pedr/*.b"]"#),
+        files: Vec<PathBuf> = key(Globs(PEDR_ENDINGS)).or(Vec::new()).unused(r#"["pedr/*.b"]"#),
         /// Edge of a cell of the terrain model, metres; at least one pixel.
         cell_m: Option<f64> = key(above_to(0.0, 1e5)).unused("100.0"),
         /// Search radius for the shift of a unit of shots, cells: the largest possible error of orbit and mounting.

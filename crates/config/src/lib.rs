@@ -75,6 +75,7 @@ pub use limits::LimitsConfig;
 pub use net::{Blunders, Method, NetConfig, TriangulationConfig, YAxis};
 pub use new_site::NewSite;
 pub use orientation::{OrientationConfig, RegistrationConfig};
+pub use paths::{DEPTH_MAX, PEDR_ENDINGS, SHOT_TABLE_ENDINGS, TIE_ENDINGS, files_in};
 pub use pedr::PedrConfig;
 pub use pointing::{PointingConfig, UsedBias};
 pub use problems::Problems;

@@ -2,7 +2,7 @@
 
 use std::{
     collections::BTreeMap,
-    fmt, io,
+    fmt, fs, io,
     path::{Path, PathBuf},
 };
 
@@ -16,6 +16,14 @@ use super::{
 
 /// Footprint columns count files in 16 bits.
 const FILES_MAX: usize = 65_535;
+/// Deepest folder below a named one in which files are found.
+pub const DEPTH_MAX: usize = 16;
+/// Endings of PEDR files.
+pub const PEDR_ENDINGS: &[&str] = &["b"];
+/// Endings of tables of shots.
+pub const SHOT_TABLE_ENDINGS: &[&str] = &["csv", "tab"];
+/// Endings of files of tie points.
+pub const TIE_ENDINGS: &[&str] = &["csv", "net", "pvl"];
 /// Folders and file name of a glob that may hold wildcards: an archive is `volume/folder/file`.
 const WILD_PARTS_MAX: usize = 3;
 
@@ -65,7 +73,10 @@ impl Form for Place {
             }
             let (span, there) = (found.value.span(), what_is_at(&path));
             let expected = format!("{}; {} is {there}", self.kind, path.display());
-            if there == MISSING {
+            let absent = path
+                .metadata()
+                .is_err_and(|error| error.kind() == io::ErrorKind::NotFound);
+            if absent {
                 review.refuse_absent(span, &found.key, expected);
             } else {
                 review.refuse(span, &found.key, expected);
@@ -82,9 +93,6 @@ impl Form for Place {
     }
 }
 
-/// The kind of an entry that does not exist.
-const MISSING: &str = "missing";
-
 /// Kind of the entry at a path, for messages.
 fn what_is_at(path: &Path) -> &'static str {
     match path.metadata() {
@@ -92,7 +100,7 @@ fn what_is_at(path: &Path) -> &'static str {
         Ok(found) if found.is_file() => "a file",
         Ok(_) => "neither a file nor a folder",
         Err(error) if error.kind() == std::io::ErrorKind::PermissionDenied => "not readable",
-        Err(_) => MISSING,
+        Err(_) => "missing",
     }
 }
 
@@ -231,14 +239,15 @@ fn matches(folder: &Path, glob: &str, endings: &[&str]) -> Result<Vec<PathBuf>, 
     // Checked separately first, so that the position refers to the written text.
     glob::Pattern::new(glob).map_err(invalid)?;
     let written = below(folder, glob);
-    let is_folder = folder.join(glob).is_dir();
-    let pattern = if is_folder {
+    if glob.is_empty() {
+        let expected = format!("{}; an empty string is not a path", ValueKind::Glob);
+        return Err(Unmatched::Other(expected));
+    }
+    if folder.join(glob).is_dir() {
         let (folder, glob) = shortened(folder, Path::new(glob));
-        below(&folder.join(glob), "**/*")
-    } else {
-        written.clone()
-    };
-    let found = glob::glob(&pattern).map_err(invalid)?;
+        return in_folder(&folder.join(glob), endings);
+    }
+    let found = glob::glob(&written).map_err(invalid)?;
     let mut files = Vec::new();
     for entry in found.take(FILES_MAX + 1) {
         let path = entry.map_err(|error| {
@@ -248,9 +257,6 @@ fn matches(folder: &Path, glob: &str, endings: &[&str]) -> Result<Vec<PathBuf>, 
                 error.error()
             )
         })?;
-        if is_folder && !has_ending(&path, endings) {
-            continue;
-        }
         match path.metadata() {
             Ok(found) if found.is_file() => files.push(path),
             Ok(_) => {}
@@ -264,18 +270,46 @@ fn matches(folder: &Path, glob: &str, endings: &[&str]) -> Result<Vec<PathBuf>, 
         }
     }
     if files.is_empty() {
-        return Err(if is_folder {
-            let expected = format!("a folder of files *.{}", endings.join(", *."));
-            Unmatched::Other(expected)
-        } else {
-            Unmatched::Absent(written.into())
-        });
+        return Err(Unmatched::Absent(written.into()));
     }
     Ok(files)
 }
 
-/// Whether the name of a file ends so, in upper or lower case.
-fn has_ending(path: &Path, endings: &[&str]) -> bool {
-    let ending = path.extension().unwrap_or_default();
-    endings.iter().any(|one| ending.eq_ignore_ascii_case(one))
+/// The files of a folder with these endings.
+fn in_folder(folder: &Path, endings: &[&str]) -> Result<Vec<PathBuf>, Unmatched> {
+    let files = files_in(folder, endings, DEPTH_MAX)
+        .map_err(|error| format!("a readable folder; {}: {error}", folder.display()))?;
+    if files.is_empty() {
+        let expected = format!("a folder that contains files *.{}", endings.join(", *."));
+        return Err(Unmatched::Other(expected));
+    }
+    Ok(files)
+}
+
+/// The files with these endings, in upper or lower case, in a folder and in the folders below it, sorted. Links to folders
+/// are not followed.
+///
+/// * `depth` – levels of folders below this one
+///
+/// # Errors
+/// A folder that cannot be listed.
+pub fn files_in(folder: &Path, endings: &[&str], depth: usize) -> io::Result<Vec<PathBuf>> {
+    let mut files = Vec::new();
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        let path = entry.path();
+        if entry.file_type()?.is_dir() {
+            if depth > 0 {
+                files.extend(files_in(&path, endings, depth - 1)?);
+            }
+            continue;
+        }
+        let ending = path.extension().unwrap_or_default();
+        let is_one = endings.iter().any(|one| ending.eq_ignore_ascii_case(one));
+        if is_one && path.is_file() {
+            files.push(path);
+        }
+    }
+    files.sort();
+    Ok(files)
 }

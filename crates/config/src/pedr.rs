@@ -13,18 +13,18 @@ use areograph_base::{
 use super::{
     declare::{Declare as _, declare_table, key, table},
     forms::{Words, above_to, from_to, list, several, whole_from_to, words},
-    paths::Globs,
+    paths::{Globs, PEDR_ENDINGS},
 };
 
 declare_table! {
     /// PEDR files. Without this table, images are oriented, but there are no footprints and no range check.
     pub struct PedrConfig: Deserialize {
-        /// Paths or globs of PEDR files, with `*`, `?`, `[..]` in at most three parts of the path; `**` is not
-        /// accepted, and letter case is significant; or folders, which stand for all files `*.b` in and below them. A
-        /// path that matches no file is refused. Every shot is counted
+        /// Paths, folders or globs of PEDR files. A folder stands for all files `*.b` in it and its subfolders. A glob
+        /// has `*`, `?`, `[..]` in at most three parts of the path; `**` is not accepted, and letter case is
+        /// significant. A path that matches no file is refused. Every shot is counted
         /// once: a copy of a file is read once, and two versions of one orbit are refused.
         #[serde(skip)]
-        files: Vec<PathBuf> = key(Globs(&["b"]))
+        files: Vec<PathBuf> = key(Globs(PEDR_ENDINGS))
             .required_as("paths or globs of PEDR files (or no table [pedr] at all)")
             .example(r#"["../pedr/*.b"]"#),
         /// Datum of the coordinates in the files; a stated datum must not contradict the version letter or the label.

@@ -41,7 +41,7 @@ const fn kind_of(is_absence: bool) -> Kind {
 
 fn advice_on(is_absence: bool, documentation: &str) -> String {
     if is_absence {
-        "correct these paths, which count from the folder of the file, or provide the files"
+        "correct these paths, which are relative to the folder of the configuration file, or provide the files"
             .to_owned()
     } else {
         format!(

@@ -10,7 +10,7 @@ use areograph_base::body::Datum;
 use super::{
     declare::{Keys, Many, declare_table, key, table},
     forms::{text, words},
-    paths::Globs,
+    paths::{Globs, SHOT_TABLE_ENDINGS},
 };
 
 /// Tables of shots of a site.
@@ -33,9 +33,9 @@ declare_table! {
     /// Each row is a shot; rows outside all windows are excluded, and malformed rows are reported with file and line.
     /// Duplicate rows are counted once.
     pub struct ShotTableConfig: Deserialize {
-        /// Paths or globs of tables, as in `[pedr]`.
+        /// Paths, folders or globs of tables, as in `[pedr]`.
         #[serde(skip)]
-        files: Vec<PathBuf> = key(Globs(&["csv", "tab"]))
+        files: Vec<PathBuf> = key(Globs(SHOT_TABLE_ENDINGS))
             .required_as("paths or globs of tables of shots")
             .unused(r#"["../lola/*.csv"]"#),
         /// Known layout of columns, in place of a table `columns`.

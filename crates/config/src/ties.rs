@@ -13,20 +13,20 @@ use super::{
     adjustment::SIGMA,
     declare::{Declare as _, Keys, declare_table, group, key},
     forms::{Switch, above_to, words},
-    paths::Globs,
+    paths::{Globs, TIE_ENDINGS},
 };
 
 declare_table! {
     /// Tie points between the images. Without this table, there is no intersection and no adjustment.
     pub struct TiesConfig: Deserialize {
-        /// Paths or globs, as in `[pedr]`, of tables (.csv) or of ISIS control networks, binary or in PVL. Tables have
+        /// Paths, folders or globs, as in `[pedr]`, of tables (.csv) or of ISIS control networks, binary or in PVL. Tables have
         /// one row per measurement: `point_id`, `serial_number`, `sample`, `line` and, where known, the standard
         /// deviations `line_sigma_px` and `sample_sigma_px`. Fixed or constrained points of control networks provide
         /// coordinates in IAU 2000. Lines and samples are counted as in ISIS: the middle of the first pixel is 1.
         /// `serial_number` is the `serial_number`, the `id` or the serial number in ISIS of an image; measurements in
         /// other images are counted and excluded.
         #[serde(skip)]
-        files: Vec<PathBuf> = key(Globs(&["csv", "net", "pvl"]))
+        files: Vec<PathBuf> = key(Globs(TIE_ENDINGS))
             .or(Vec::new())
             .example(r#"["../ties/*.csv"]"#),
         /// Whether areograph measures tie points itself, in addition to tie points in files. Every pair of images with

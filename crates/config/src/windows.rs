@@ -69,7 +69,8 @@ declare_table! {
         /// South and north edges.
         latitude_deg: Option<[f64; 2]> =
             key(several(from_to(-90.0, 90.0), "two numbers [south, north]")).example("[-14.0, -12.9]"),
-        /// Direction in which these longitudes increase.
+        /// Direction in which these longitudes increase. With "west", the west edge is the larger number:
+        /// `[184.95, 184.45]` is 0.5 degrees wide.
         longitude: LongitudeSense = key(words([
             ("east", LongitudeSense::East, ""),
             ("west", LongitudeSense::West, "as on older maps of Mars"),
@@ -243,6 +244,10 @@ impl BoxCoordinates {
     pub fn east_deg(self, edges_deg: [f64; 2]) -> [f64; 2] {
         match self.longitude {
             LongitudeSense::East => edges_deg,
+            // All longitudes, in either order.
+            LongitudeSense::West if ((edges_deg[1] - edges_deg[0]).abs() - 360.0).abs() <= 0.0 => {
+                [0.0, 360.0]
+            }
             // Not −0.
             LongitudeSense::West => edges_deg.map(|west| 0.0 - west),
         }
@@ -342,6 +347,9 @@ mod tests {
         // Degrees; rounding of the sum with 360.
         let wrapped = wrapped_longitudes([west, east]).unwrap();
         assert!((wrapped[0] - 175.05).abs() + (wrapped[1] - 175.55).abs() < 1e-12);
+        for all in [[0.0, 360.0], [180.0, -180.0], [-180.0, 180.0], [360.0, 0.0]] {
+            assert_eq!(wrapped_longitudes(older.east_deg(all)), Some([0.0, 360.0]));
+        }
         let [south, equator] = older.areocentric_deg([-15.27, 0.0]);
         // tan(areocentric) = (c/a)² tan(areographic), a = 3396.19 km and c = 3376.20 km (IAU 2000).
         let tangent = 15.27_f64.to_radians().tan() * (3376.20_f64 / 3396.19).powi(2);

@@ -15,6 +15,7 @@ use super::{
 use areograph_base::{
     constants::NAIF_MARS,
     error::{IoError, Locate, Result},
+    instruments::Instrument,
 };
 use areograph_config::PointingConfig;
 use areograph_geom::light_time::LightTime;
@@ -22,7 +23,7 @@ use areograph_spice::{
     EncodedCkSegment, Kernel, KernelSet, SpkSegment, write_encoded_ck, write_spk,
 };
 use areograph_stages::{
-    tabulate_kernels::{AdjustedTables, KernelTables},
+    tabulate_kernels::{AdjustedTables, KernelReading, KernelTables},
     tag_times::ImageTimes,
 };
 
@@ -86,17 +87,22 @@ impl KernelReaders {
         self.declarations().map(|of| of.path_of(image))
     }
 
-    /// The convention by which these readers compute the camera, in a run with the convention `run`.
+    /// How these readers compute `camera`, in a run with the convention `run` and this bias.
     #[must_use]
-    pub const fn convention(self, run: LightTime) -> LightTime {
+    pub fn reading(
+        self,
+        run: LightTime,
+        camera: &Instrument,
+        pointing: &PointingConfig,
+    ) -> KernelReading {
         match self {
-            Self::Run => run,
-            Self::Centre => LightTime::Centre,
+            Self::Run => KernelReading::of_run(run, camera, pointing),
+            Self::Centre => KernelReading::of_isis(camera),
         }
     }
 
-    /// Whether they have a pair of an image whose orientation is valid or not. With an attitude that jumps, so does the light
-    /// time along the boresight, which only states for readers with the same convention can follow.
+    /// Whether they have a pair of an image whose orientation is valid or not. Where the attitude jumps, the light time along the
+    /// boresight also jumps; only states for readers with the convention of the run reproduce it.
     #[must_use]
     pub const fn have(self, is_valid: bool) -> bool {
         matches!(self, Self::Run) || is_valid
@@ -300,14 +306,15 @@ fn write_position(
 /// Text of the comment areas of both kernels.
 fn comment(image: &AdjustedImage, readers: KernelReaders, to: &AdjustedKernels) -> String {
     let times = image.times;
-    let bias_s = to.pointing.bias_of(&times.instrument).seconds();
+    let reading = readers.reading(image.light_time, &times.instrument, to.pointing);
+    let bias_s = reading.bias.seconds();
     let usual_s = times.instrument.pointing.ck_bias_s;
     let others = if (bias_s - usual_s).abs() < BIAS_TOLERANCE_S {
         "ISIS and ALE apply this offset, too.".to_owned()
     } else {
         format!(
-            "ISIS and ALE always read the attitude at an offset of {usual_s:.3} s: do not use this\n\
-             file with them."
+            "ISIS and ALE always read the attitude at an offset of {usual_s:.3} s: load the files in\n\
+             exchange/centre there."
         )
     };
     format!(
@@ -332,7 +339,7 @@ fn comment(image: &AdjustedImage, readers: KernelReaders, to: &AdjustedKernels) 
         version = env!("CARGO_PKG_VERSION"),
         exposed = times.exposures(),
         utc = times.utc_start,
-        positions = positions(readers.convention(image.light_time)),
+        positions = positions(reading.light_time),
         sign = if bias_s < 0.0 { '-' } else { '+' },
         size = bias_s.abs(),
     )

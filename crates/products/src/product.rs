@@ -288,9 +288,8 @@ impl Declaration {
             Write::Ties(_) => "a site with tie points",
             Write::Matched(_) => "a site with matched tie points",
             Write::Adjustment(_) | Write::Several(_) => "a site with an adjustment",
-            Write::AdjustedImage(_) | Write::WithAnother => {
-                "every image of a site with an adjustment"
-            }
+            Write::AdjustedImage(_) => "every image of a site with an adjustment",
+            Write::WithAnother => "every image of a site with an adjustment, without support data",
         };
         when.to_owned()
     }

@@ -60,7 +60,7 @@ const DEFINITIONS: [(&str, &str); 7] = [
 
 /// Meaning of a line of ISIS.
 pub(super) const ISIS_LINE: &str = "line in ISIS (qview, campt), 1 at the centre of the first line of the image file: before the adjustment with the \
-     original kernels, after it with those of exchange/centre; missing outside the file";
+     original kernels (or support data) and the pointing bias of the site, after it with those of exchange/centre; missing outside the file";
 /// Meaning of a sample of ISIS.
 pub(super) const ISIS_SAMPLE: &str =
     "sample in ISIS, 1 at the centre of the first pixel, with the same kernels as the line in ISIS";

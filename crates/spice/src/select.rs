@@ -59,7 +59,7 @@ impl KernelSet {
         Self::select_of(&InputFiles::default(), selection, cameras, required)
     }
 
-    /// All kernels of a folder, text kernels first, then ephemerides and attitudes, each by name. A site chooses among them.
+    /// All kernels of a folder, text kernels first, then ephemerides and attitudes, each by name. Sites select from them.
     ///
     /// # Errors
     /// [`SpiceError::NotAKernel`] for a folder without a kernel; [`IoError`] when the folder cannot be read.

@@ -77,6 +77,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
     let outputs = std::iter::once(&arguments.out).chain(&arguments.mask);
     require_apart(outputs.map(PathBuf::as_path), [arguments.file.as_path()])?;
     let progress = Progress::of_work("image extract");
+    progress.show("decoding".to_owned());
     let image = PixelFile::open(&arguments.file, all_instruments())?;
     let (mut lines, mut odd_even, mut complaints) = (
         0,

@@ -58,11 +58,15 @@ impl Answers {
             &arguments.kernels,
             &kernels,
         )?;
-        let pedr = paths(
-            "PEDR files, folders or globs [none]",
-            &arguments.pedr,
-            &|paths| of_kind(paths, &files::PEDR_FILES),
-        )?;
+        let pedr = if arguments.shots.is_empty() {
+            paths(
+                "PEDR files, folders or globs, separated by spaces [none]",
+                &arguments.pedr,
+                &|paths| of_kind(paths, &files::PEDR_FILES),
+            )?
+        } else {
+            Vec::new()
+        };
         let shots = if pedr.is_empty() {
             paths(
                 "Shot tables from the Orbital Data Explorer [none]",
@@ -91,7 +95,11 @@ impl Answers {
         answers.edges_deg = match arguments.edges_deg {
             Some(written) => Some(arguments.meaning.edges_deg(written)?),
             None if asks && !answers.pedr.is_empty() => ask(
-                "Window west,east,south,north in degrees [the area that the images cover]",
+                if answers.images.is_empty() {
+                    "Window west,east,south,north in degrees"
+                } else {
+                    "Window west,east,south,north in degrees [the area that the images cover]"
+                },
                 |answer| answers.window(arguments, answer),
             )?,
             None => None,
@@ -100,7 +108,7 @@ impl Answers {
         Ok(answers)
     }
 
-    /// The window of an answer; none is needed where images determine it.
+    /// The window of an answer, which may be empty if images determine the window.
     fn window(&self, arguments: &Arguments, answer: &str) -> Result<Option<[f64; 4]>> {
         if answer.is_empty() && !self.images.is_empty() {
             return Ok(None);

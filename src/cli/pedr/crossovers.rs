@@ -29,7 +29,7 @@ use crate::{
 /// belong to the others. Profiles are named by window and orbit. Shifts are relative: what all profiles share is not
 /// determined.
 #[derive(Debug, Args)]
-#[command(group = ArgGroup::new("where").required(true).multiple(true).args(["boxes", "polygons", "windows"]))]
+#[command(group = ArgGroup::new("where").required(true).multiple(true).args(["box", "polygons", "windows"]))]
 #[command(
     after_help = "Example: areograph pedr crossovers archive --box 137.0,138.0,-5.5,-4.0 > crossovers.json"
 )]

@@ -66,7 +66,7 @@ fn print(statement: &Value, out: Option<&Path>) {
         .map(|(reason, shots)| format!("{reason}: {}", count(shots)))
         .collect();
     if !rejected.is_empty() {
-        output::line(format_args!("shots left out: {}", rejected.join(", ")));
+        output::line(format_args!("rejected shots: {}", rejected.join(", ")));
     }
     if let Some(out) = out {
         output::line(format_args!("{}: written", out.display()));

@@ -1,6 +1,6 @@
 //! Descriptions of the files in the folder `exchange`, and the commands that read them.
 
-use std::fmt::Write as _;
+use std::{fmt::Write as _, path::Path};
 
 use crate::{
     coordinates::frame,
@@ -60,17 +60,19 @@ fn text(of: &Context) -> String {
         }
     }
     for program in PROGRAMS {
-        let uses = files.iter().flat_map(|file| file.uses);
-        let lines: Vec<&str> = uses
-            .filter(|of| of.program == program)
-            .flat_map(|of| of.lines.lines())
+        let uses = files
+            .iter()
+            .flat_map(|file| file.uses.iter().map(move |of| (*file, of)));
+        let lines: Vec<(&Declaration, &str)> = uses
+            .filter(|(_, of)| of.program == program)
+            .flat_map(|(file, of)| of.lines.lines().map(move |line| (file, line)))
             .collect();
         if lines.is_empty() {
             continue;
         }
         let _infallible = write!(text, "\n{}\n", about(program, &terms));
-        for line in lines {
-            for line in for_images(line, of) {
+        for (file, line) in lines {
+            for line in for_images(file, line, of) {
                 let _infallible = writeln!(text, "  {line}");
             }
         }
@@ -92,8 +94,8 @@ fn light_time(site: &SiteProducts) -> String {
         "Files in the folder centre/ have the light-time convention of ISIS and ALE in every run: positions as seen from the\n\
          centre of {body} (LT+S). Other camera models, lines and samples, and kernels have the convention of this run,\n\
          {}.\n\
-         With the orientation from the kernels, the two conventions see the ground about 10 lines apart. ../registration.json\n\
-         states the differences for each image; isis_line and isis_sample of ../registration.parquet are places in ISIS.\n\n",
+         With the orientation from the kernels, a ground point has different lines in the two conventions: ../registration.json\n\
+         states the differences for each image; isis_line and isis_sample of ../registration.parquet are those of ISIS.\n\n",
         convention(site)
     );
     if site.adjustment().is_some() {
@@ -130,15 +132,21 @@ fn files(of: &Context) -> Vec<&'static Declaration> {
     files
 }
 
-/// The line, once per image for a file of images.
-fn for_images(line: &str, of: &Context) -> Vec<String> {
+/// The line, once per image for a file of images, where it has been written or is still to be written.
+fn for_images(file: &Declaration, line: &str, of: &Context) -> Vec<String> {
     let line = of.site.config.terms().fill(line);
     if !line.contains(IMAGE) {
         return vec![line.into_owned()];
     }
-    let images = of.site.images.iter();
+    let own = of
+        .written
+        .iter()
+        .filter(|(_, declaration)| declaration.path == file.path);
+    let written: Vec<&Path> = own.map(|(product, _)| product.path.as_path()).collect();
+    let images = of.site.images.iter().map(|image| &image.times.id);
     images
-        .map(|image| line.replace(IMAGE, &image.times.id))
+        .filter(|image| written.is_empty() || written.contains(&Path::new(&file.path_of(image))))
+        .map(|image| line.replace(IMAGE, image))
         .collect()
 }
 

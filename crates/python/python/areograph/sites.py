@@ -74,9 +74,9 @@ def check(site: StrPath, *, out: StrPath = "out", full: bool = False) -> Check:
     Parameters
     ----------
     site, out
-        As of `plan`. If the products in ``out`` are up to date, the verdict is theirs.
+        As of `plan`. If the products in ``out`` are up to date, their verdict is returned.
     full
-        Otherwise compute every stage for the verdict, as a run does; nothing is written.
+        Compute every stage for the verdict if the products are not up to date; no product is written.
     """
     answer = _answer(_native.check(os.fspath(site), os.fspath(out), full))
     return Check(

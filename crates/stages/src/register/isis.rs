@@ -1,4 +1,4 @@
-//! Lines and samples as ISIS has them: what a user enters in `qview` and `campt`.
+//! Lines and samples in the ISIS convention: what a user enters in `qview` and `campt`.
 //!
 //! They count from 1 at the centres of the first line and pixel, in the delivered image file, which begins with the first
 //! line of the header image. ISIS and ALE read the kernels with light time to the centre of the body, so that footprints

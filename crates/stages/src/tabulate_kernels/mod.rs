@@ -1,9 +1,8 @@
 //! Adjusted orientations as states and attitudes for SPICE kernels that are loaded after the original ones.
 //!
 //! Time tags of the attitude follow the rule of the kernels that they replace: the attitude of an exposure at `t` is
-//! stored at `t` + bias. By default ISIS and ALE read MOC attitude 1.15 s before the exposure (`SetTimeBias(-1.15)` in
-//! ISIS, `instrument_time_bias` in ALE), as areograph does with its usual bias, so that one kernel serves all three. A
-//! second kernel without the bias would be wrong in each of them.
+//! stored at `t` + bias, with the bias of the readers. ISIS and ALE always read MOC attitude 1.15 s before the exposure
+//! (`SetTimeBias(-1.15)` in ISIS, `instrument_time_bias` in ALE), whatever the bias of the site is.
 //!
 //! A shift of line times is folded into both kernels: at the tag of a line they have the orientation of the instant at
 //! which it was exposed. Therefore each pair is valid for its image only, not for other events at that time such as
@@ -27,7 +26,8 @@ use serde::{Deserialize, Serialize};
 use super::{orientation::Orientation, tag_times::ImageTimes};
 use areograph_base::{
     error::{Cause, Result},
-    time::{Et, Interval},
+    instruments::Instrument,
+    time::{Et, Interval, PointingBias},
 };
 use areograph_config::{KernelsConfig, PointingConfig};
 use areograph_geom::{light_time::LightTime, pushbroom::SamplesError};
@@ -39,13 +39,42 @@ use areograph_store::{
 pub use read_back::require_same;
 use tables::Source;
 
+/// How readers of kernels compute a camera.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct KernelReading {
+    /// Their convention for light time.
+    pub light_time: LightTime,
+    /// The bias at which they read the attitude.
+    pub bias: PointingBias,
+}
+
+impl KernelReading {
+    /// As the run does, whose bias may replace the camera's.
+    #[must_use]
+    pub fn of_run(light_time: LightTime, camera: &Instrument, pointing: &PointingConfig) -> Self {
+        Self {
+            light_time,
+            bias: pointing.bias_of(camera),
+        }
+    }
+
+    /// As ISIS and ALE do.
+    #[must_use]
+    pub fn of_isis(camera: &Instrument) -> Self {
+        Self {
+            light_time: LightTime::Centre,
+            bias: camera.pointing_bias(),
+        }
+    }
+}
+
 /// Contents of the adjusted kernels of one image, by the convention of their readers; empty for an image of support data,
 /// which has no original kernels.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct AdjustedTables {
     /// For readers with the convention of the run.
     pub own: KernelTables,
-    /// For ISIS and ALE, [`LightTime::Centre`].
+    /// For ISIS and ALE, [`KernelReading::of_isis`].
     pub centre: KernelTables,
 }
 
@@ -106,7 +135,7 @@ impl Stage for TabulateKernels<'_> {
             return Ok(AdjustedTables::default());
         }
         let (session, orientation) = (self.kernels.session()?, self.orientation.value()?);
-        let tabulate = |readers| {
+        let tabulate = |reading| {
             let kernels = self.coverage;
             let index = *self.index;
             tabulate_kernels(
@@ -114,15 +143,20 @@ impl Stage for TabulateKernels<'_> {
                 &times,
                 index,
                 orientation,
-                readers,
+                reading,
                 kernels,
                 self.pointing,
             )
         };
-        let own = tabulate(orientation.light_time.convention)?;
-        let centre = match orientation.light_time.convention {
-            LightTime::Centre => own.clone(),
-            _ => tabulate(LightTime::Centre)?,
+        let camera = &times[*self.index].instrument;
+        let light_time = orientation.light_time.convention;
+        let of_run = KernelReading::of_run(light_time, camera, self.pointing);
+        let of_isis = KernelReading::of_isis(camera);
+        let own = tabulate(of_run)?;
+        let centre = if of_run == of_isis {
+            own.clone()
+        } else {
+            tabulate(of_isis)?
         };
         Ok(AdjustedTables { own, centre })
     }
@@ -142,8 +176,8 @@ enum TabulateError {
     ReadBack { what: String },
 }
 
-/// States and attitudes around one of `images`, whose adjusted orientation is `orientation`, for readers with the
-/// light-time convention `readers`.
+/// States and attitudes around one of `images`, whose adjusted orientation is `orientation`, for readers that compute
+/// cameras by `reading`.
 ///
 /// Attitudes come from samples and camera tables, positions from the original kernels plus the interpolated difference
 /// at the samples; positions are geometric, so that readers with their convention obtain the positions of `orientation`. Around the image, where neither is available, the original motion continues with the difference at the
@@ -156,7 +190,7 @@ pub fn tabulate_kernels(
     images: &[&ImageTimes],
     index: usize,
     orientation: &Orientation,
-    readers: LightTime,
+    reading: KernelReading,
     kernels: &KernelsConfig,
     pointing: &PointingConfig,
 ) -> Result<KernelTables> {
@@ -164,7 +198,7 @@ pub fn tabulate_kernels(
         session: &session.of(images[index].instrument.spacecraft),
         times: images[index],
         orientation,
-        readers,
+        reading,
         tolerance_s: kernels.ck_tolerance_s,
         bias: pointing.bias_of(&images[index].instrument),
         attitude_span: span(images, index, kernels.padding_s),

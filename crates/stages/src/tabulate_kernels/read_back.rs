@@ -1,13 +1,13 @@
 //! Whether written kernels reproduce the orientation that they were made from.
 
-use super::TabulateError;
+use super::{KernelReading, TabulateError};
 use crate::{
     orientation::{Orientation, RayOrigin},
     tag_times::ImageTimes,
 };
 use areograph_base::error::Result;
-use areograph_config::{KernelsConfig, PointingConfig};
-use areograph_geom::{attitude::rotation_vector, light_time::LightTime, statistics::largest};
+use areograph_config::KernelsConfig;
+use areograph_geom::{attitude::rotation_vector, statistics::largest};
 use areograph_spice::Session;
 
 /// Tolerance for positions read back from a kernel, metres: 30 times the 3e-5 m that MGS flies in the 7e-9 s to which
@@ -18,7 +18,7 @@ const POSITION_TOLERANCE_M: f64 = 1e-3;
 const ROTATION_TOLERANCE_RAD: f64 = 1e-9;
 
 /// Makes sure that `session`, with the original kernels and a pair of the image, gives every sample of `orientation` to
-/// readers with the light-time convention `readers`.
+/// readers that compute cameras by `reading`.
 ///
 /// # Errors
 /// [`Kind::Bug`](areograph_base::error::Kind::Bug) for orientations that are not reproduced within 1 mm and 1e-9 rad, and the
@@ -27,18 +27,17 @@ pub fn require_same(
     session: &Session,
     image: &ImageTimes,
     orientation: &Orientation,
-    readers: LightTime,
+    reading: KernelReading,
     kernels: &KernelsConfig,
-    pointing: &PointingConfig,
 ) -> Result<()> {
     let session = &session.of(image.instrument.spacecraft);
     let (mut distances_m, mut turns_rad) = (Vec::new(), Vec::new());
     for sample in &orientation.samples {
-        let lookup = pointing.bias_of(&image.instrument).lookup(sample.et);
+        let lookup = reading.bias.lookup(sample.et);
         let attitude = session.attitude(lookup, sample.et, kernels.ck_tolerance_s)?;
         let to_camera = session.mounting(&image.instrument, sample.et)? * attitude.inertial_to_bus;
         let boresight = to_camera.matrix().row(2).transpose();
-        let origin = RayOrigin::at(session, readers, sample.et, &boresight)?;
+        let origin = RayOrigin::at(session, reading.light_time, sample.et, &boresight)?;
         let camera_to_mars = origin.to_mars * to_camera.inverse();
         let expected = sample.pose().mars_to_camera;
         distances_m.push(origin.position().distance_m(&sample.position));

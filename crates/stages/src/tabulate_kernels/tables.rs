@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{KernelTables, TabulateError, earlier, later};
+use super::{KernelReading, KernelTables, TabulateError, earlier, later};
 use crate::{
     orientation::{Orientation, OrientationSample},
     tag_times::ImageTimes,
@@ -17,7 +17,6 @@ use areograph_geom::{
     attitude::continuous_quaternions,
     body_rotation::body_rotation,
     lagrange::lagrange,
-    light_time::LightTime,
     pushbroom::{ExteriorOrientation, Pose, SampledOrientation},
 };
 use areograph_spice::{Attitude, Session, State};
@@ -37,9 +36,10 @@ pub(super) struct Source<'a> {
     pub(super) times: &'a ImageTimes,
     /// Adjusted orientation.
     pub(super) orientation: &'a Orientation,
-    /// Light-time convention of the readers of the kernels.
-    pub(super) readers: LightTime,
+    /// How the readers of the new kernels compute cameras.
+    pub(super) reading: KernelReading,
     pub(super) tolerance_s: f64,
+    /// The bias of the run, at which the original kernels are read.
     pub(super) bias: PointingBias,
     /// The time that the CK covers.
     pub(super) attitude_span: Interval,
@@ -59,7 +59,7 @@ impl Source<'_> {
     pub(super) fn tables(&self) -> Result<KernelTables> {
         let nodes = self.nodes()?;
         let ticks = nodes.iter().map(|node| {
-            let lookup = self.bias.lookup(node.exposure);
+            let lookup = self.reading.bias.lookup(node.exposure);
             self.session.et_to_ticks(lookup.kernel_time())
         });
         let flown = self.flown()?;
@@ -76,7 +76,7 @@ impl Source<'_> {
     /// Instant and position of the spacecraft for each sample.
     fn flown(&self) -> Result<Vec<(Et, Position<J2000>)>> {
         let samples = self.orientation.samples.iter();
-        let flown = samples.map(|sample| sample.flown(self.session, self.readers));
+        let flown = samples.map(|sample| sample.flown(self.session, self.reading.light_time));
         flown.collect()
     }
 
@@ -169,14 +169,14 @@ impl Source<'_> {
             light_time,
             ..
         } = self.orientation;
-        let is_own = light_time.convention == self.readers;
+        let is_own = light_time.convention == self.reading.light_time;
         let last = tables.et_s.len().saturating_sub(1);
         let bus_to_camera = tables.bus_to_camera.matrix();
         let start_s = tables.et_s.first().copied().unwrap_or_default();
         let step_s =
             (tables.et_s.last().copied().unwrap_or_default() - start_s) / last.max(1) as f64;
         let of_sample = |sample: &OrientationSample| {
-            let to_mars = sample.mars_seen(self.readers);
+            let to_mars = sample.mars_seen(self.reading.light_time);
             let mars_to_camera = sample.pose().mars_to_camera;
             let at = (sample.et.seconds() - start_s) / step_s;
             Node {

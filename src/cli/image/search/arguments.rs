@@ -31,7 +31,7 @@ const PIXEL_MAX_M: f64 = 1e7;
 /// Example: areograph image search cumindex.tab --box 137.0,138.0,-5.5,-4.0
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
-#[command(group = ArgGroup::new("where").required(true).multiple(true).args(["boxes", "polygons", "windows", "sites"]))]
+#[command(group = ArgGroup::new("where").required(true).multiple(true).args(["box", "polygons", "windows", "sites"]))]
 pub(in crate::cli::image) struct Arguments {
     /// Indexes of the archive (cumindex.tab, imgindex.tab), their labels (.lbl) beside them.
     #[arg(required = true, value_name = "INDEX")]

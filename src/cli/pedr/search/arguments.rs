@@ -23,7 +23,7 @@ use crate::{
 /// Example: areograph pedr search archive --box 137.0,138.0,-5.5,-4.0 --out gale.parquet
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
-#[command(group = ArgGroup::new("where").required(true).multiple(true).args(["boxes", "polygons", "windows"]))]
+#[command(group = ArgGroup::new("where").required(true).multiple(true).args(["box", "polygons", "windows"]))]
 pub(in crate::cli::pedr) struct Arguments {
     /// PEDR files, and folders with .b files in and below them; or tables of the Orbital Data Explorer's PEDR query.
     #[arg(required = true, value_name = "PATH")]
