@@ -7,7 +7,9 @@ use clap::Args;
 use super::{load_sites, output, progress::Progress};
 use crate::{
     error::{Error, Kind},
-    flow::{Checked, Extent, PUBLISH, RunOptions, check_answer, check_out, check_site},
+    flow::{
+        Checked, Extent, FoundProducts, PUBLISH, RunOptions, check_answer, check_out, check_site,
+    },
     store::hashes::HashCache,
 };
 
@@ -97,12 +99,20 @@ fn print(site: &str, checked: &Checked) {
     }
     let Some(verdict) = &checked.verdict else {
         if checked.failures.is_empty() {
-            output::line("  verdict: not computed; --full computes it, as a run does");
+            let stale = match checked.products {
+                FoundProducts::OutOfDate => {
+                    "products are out of date (areograph plan states why); "
+                }
+                _ => "",
+            };
+            output::line(format_args!(
+                "  {stale}verdict: not computed; --full computes it, as a run does"
+            ));
         }
         return;
     };
     let word = verdict.word();
-    output::line(if checked.has_products {
+    output::line(if checked.products == FoundProducts::Current {
         format!("  products are up to date; verdict: {word}")
     } else {
         format!("  a run would be {word}")

@@ -41,7 +41,7 @@ use tracing::level_filters::LevelFilter;
 
 use crate::{
     config::{Document, SiteConfig, check_sites},
-    error::Error,
+    error::{Cause, Error, Locate as _},
 };
 
 /// Mars Global Surveyor data preparation: SPICE kernels, MOLA shots and MOC images to validated products.
@@ -227,13 +227,32 @@ fn load<T: Document>(path: &Path) -> Result<T, Error> {
     Ok(loaded.config)
 }
 
+/// A file of another flow.
+#[derive(Debug, thiserror::Error, Cause)]
+#[error("describes a {what}; expected a site")]
+#[cause(Configuration: "use `areograph {command}`")]
+struct NoSite {
+    what: &'static str,
+    command: &'static str,
+}
+
+/// Refuses files of other flows by their kind; loading reports all other faults.
+fn site_file(path: &Path) -> Result<(), Error> {
+    for (what, command) in [("net", "triangulate"), ("calibration", "calibrate")] {
+        if plan::has_key(path, what) && !plan::has_key(path, "site") {
+            return Err(NoSite { what, command }).in_file(path);
+        }
+    }
+    Ok(())
+}
+
 /// Loads site files, also of folders and globs; every problem of every file is reported before the first failure is
 /// returned.
 fn load_sites(paths: &[PathBuf]) -> Result<Vec<SiteConfig>, Error> {
     let mut sites = Vec::with_capacity(paths.len());
     let mut first_failure = None;
     for path in files::expand(paths, &files::CONFIGURATIONS)? {
-        match load(&path) {
+        match site_file(&path).and_then(|()| load(&path)) {
             Ok(site) => sites.push(site),
             Err(failure) => {
                 if let Some(earlier) = first_failure.replace(failure) {

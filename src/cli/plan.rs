@@ -70,7 +70,7 @@ impl Files {
 }
 
 /// Whether a file has this key outside of tables; loading reports a file that cannot be read.
-fn has_key(path: &Path, key: &str) -> bool {
+pub(super) fn has_key(path: &Path, key: &str) -> bool {
     let text = fs::read_to_string(path).unwrap_or_default();
     let table: Result<toml::Table, _> = text.parse();
     table.is_ok_and(|table| table.contains_key(key))

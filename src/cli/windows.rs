@@ -67,12 +67,17 @@ enum Latitude {
 /// A box whose edges may have been exchanged.
 #[derive(Debug, thiserror::Error, Cause)]
 #[error("the box spans {width_deg}° eastward, from {west} to {east}; expected at most 180°")]
-#[cause(Configuration: "exchange west and east for the other {}°, or give --wide", 360.0 - width_deg)]
+#[cause(Configuration: "exchange west and east for the other {}°, or give --wide", rounded(360.0 - width_deg))]
 struct Wide {
     width_deg: f64,
     /// Edges as written.
     west: f64,
     east: f64,
+}
+
+fn rounded(angle_deg: f64) -> f64 {
+    let scale = 10.0_f64.powi(EDGE_DIGITS);
+    (angle_deg * scale).round() / scale
 }
 
 impl BoxMeaning {
@@ -92,10 +97,6 @@ impl BoxMeaning {
             },
         };
         let [west_deg, east_deg] = coordinates.east_deg([west, east]);
-        let rounded = |edge: f64| {
-            let scale = 10.0_f64.powi(EDGE_DIGITS);
-            (edge * scale).round() / scale
-        };
         let [south_deg, north_deg] = match self.latitude {
             Latitude::Areocentric => [south, north],
             Latitude::Areographic => coordinates.areocentric_deg([south, north]).map(rounded),

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
-use super::{Checked, Ending, RunOutcome, RunPlan, StageReason, Task};
+use super::{Checked, Ending, FoundProducts, RunOutcome, RunPlan, StageReason, Task};
 use crate::store::{manifest::Manifest, publish::read_manifest};
 
 /// Answer of `areograph run --json` on one site: stages with their reasons, and the verdict of the products.
@@ -64,7 +64,7 @@ pub fn check_answer(site: &str, checked: &Checked) -> Value {
         "ready": checked.failures.is_empty(),
         "findings": checked.findings,
         "verdict": checked.verdict,
-        "products_are_current": checked.has_products,
+        "products_are_current": checked.products == FoundProducts::Current,
         "failures": failures.collect::<Vec<_>>(),
     })
 }

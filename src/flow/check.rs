@@ -34,8 +34,20 @@ pub struct Checked {
     pub failures: Vec<Error>,
     /// The verdict of a run; `None` if an input prevents it, or if it is not known without computing.
     pub verdict: Option<Verdict>,
-    /// Whether the verdict is that of products that are up to date.
-    pub has_products: bool,
+    /// Products in the output folder.
+    pub products: FoundProducts,
+}
+
+/// Products that a check finds.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum FoundProducts {
+    /// None, or not examined.
+    #[default]
+    Absent,
+    /// A run would replace them.
+    OutOfDate,
+    /// A run would keep them: the verdict is theirs.
+    Current,
 }
 
 /// Extent of a check.
@@ -167,11 +179,13 @@ impl<'a> Check<'a> {
             return Ok(false);
         };
         let plan = plan_task(task, options)?;
-        self.checked.has_products = plan.stages.iter().all(|stage| !stage.reason.runs());
-        if self.checked.has_products {
-            self.judge(manifest.verdict);
+        if plan.stages.iter().any(|stage| stage.reason.runs()) {
+            self.checked.products = FoundProducts::OutOfDate;
+            return Ok(false);
         }
-        Ok(self.checked.has_products)
+        self.checked.products = FoundProducts::Current;
+        self.judge(manifest.verdict);
+        Ok(true)
     }
 
     /// Enters the verdict; its reasons are failures.
@@ -179,7 +193,7 @@ impl<'a> Check<'a> {
         for reason in &verdict.reasons {
             let reason = reason.clone();
             let failure = Error::from(Invalid {
-                exist: self.checked.has_products,
+                exist: self.checked.products == FoundProducts::Current,
                 reason,
             });
             self.checked.failures.push(failure.in_site(self.site));

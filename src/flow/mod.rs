@@ -44,7 +44,7 @@ mod triangulate;
 
 pub use answers::{check_answer, plan_answer, run_answer};
 pub use archive::{ArchiveRequest, archive_filter, archive_limits};
-pub use check::{Checked, Extent, check_site, required_by_site, rival_sets};
+pub use check::{Checked, Extent, FoundProducts, check_site, required_by_site, rival_sets};
 pub use choice::{ChooseKernels, KernelChoice, RivalKernelSets};
 pub use compare::{
     Answer, Compared, EPOCHS_MAX, Request, RivalSet, Uncovered, compare_kernels, comparison_schema,

@@ -35,6 +35,13 @@ pub enum OutError {
         /// The obstacle.
         holds: &'static str,
     },
+    /// Folders cannot be made in it.
+    #[error("--out is {}, which is not a folder", .out.display())]
+    #[cause("name a folder for --out")]
+    NoFolder {
+        /// The path.
+        out: PathBuf,
+    },
     /// Products would be inputs of the next run, or inputs lie among products.
     #[error(
         "the output folder {} overlaps the input folder {}; expected separate folders",
@@ -164,6 +171,10 @@ pub(super) fn check_out_path(out: &Path) -> Result<()> {
         out: out.to_owned(),
         holds,
     };
+    if out.exists() && !out.is_dir() {
+        let out = out.to_owned();
+        return Err(OutError::NoFolder { out }.into());
+    }
     let text = out.to_str().ok_or_else(|| unspeakable("is not UTF-8"))?;
     if text.contains(char::is_control) {
         return Err(unspeakable("contains control characters").into());

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use areograph_base::{
-    error::{Cause, Error, Locate as _},
+    error::{Cause, Error, IoError, Locate as _},
     units::RADIANS_PER_DEGREE,
 };
 use areograph_geom::window::WindowShape;
@@ -128,6 +128,7 @@ pub fn window_of_box(id: &str, edges_deg: [f64; 4]) -> Result<WindowConfig, Erro
 /// # Errors
 /// The file cannot be read; it contains no polygons.
 pub fn window_of_polygon(path: &Path) -> Result<WindowConfig, Error> {
+    path.metadata().map_err(IoError::on("open")).in_file(path)?;
     let polygons = geojson::read(path)
         .map_err(|error| WindowError::Polygon(error.to_string()))
         .in_file(path)?;

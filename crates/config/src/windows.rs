@@ -179,8 +179,8 @@ fn bounds(
     coordinates: BoxCoordinates,
     keys: &mut Keys<'_, '_>,
 ) -> Option<WindowShape> {
-    let longitudes = longitude.and_then(|pair| {
-        let pair = coordinates.east_deg(pair);
+    let longitudes = longitude.and_then(|written| {
+        let pair = coordinates.east_deg(written);
         let wrapped = wrapped_longitudes(pair);
         if wrapped.is_none() {
             keys.refuse(
@@ -189,7 +189,7 @@ fn bounds(
             );
         }
         if wrapped.is_some() {
-            name_wide(pair, keys);
+            name_wide(pair, written, keys);
         }
         wrapped
     });
@@ -268,8 +268,8 @@ impl BoxCoordinates {
 }
 
 /// Warns of a window that covers more than half of all longitudes, but not all: its edges may have been swapped.
-fn name_wide([west, east]: [f64; 2], keys: &mut Keys<'_, '_>) {
-    if let Some(width) = suspicious_width_deg([west, east])
+fn name_wide(east_longitudes: [f64; 2], [west, east]: [f64; 2], keys: &mut Keys<'_, '_>) {
+    if let Some(width) = suspicious_width_deg(east_longitudes)
         && let Some(span) = keys.span_of("longitude_deg")
     {
         keys.review().warn(
@@ -277,7 +277,7 @@ fn name_wide([west, east]: [f64; 2], keys: &mut Keys<'_, '_>) {
             format!(
                 "longitude_deg spans {width}° eastward, from {west}° to {east}°; for the other {}°, write \
                  [{east}, {west}]",
-                360.0 - width
+                rounded(360.0 - width)
             ),
         );
     }
@@ -287,8 +287,13 @@ fn name_wide([west, east]: [f64; 2], keys: &mut Keys<'_, '_>) {
 /// Degrees.
 #[must_use]
 pub fn suspicious_width_deg([west_deg, east_deg]: [f64; 2]) -> Option<f64> {
-    let width_deg = (east_deg - west_deg).rem_euclid(360.0);
+    let width_deg = rounded((east_deg - west_deg).rem_euclid(360.0));
     (width_deg > 180.0).then_some(width_deg)
+}
+
+/// An angle in degrees for a message, without the rounding errors of a difference.
+fn rounded(angle_deg: f64) -> f64 {
+    (angle_deg * 1e9).round() / 1e9
 }
 
 /// Longitudes in `0..360`, or `[0, 360]` for all of them; `None` when the width is 0 or over 360°.

@@ -8,7 +8,7 @@ use serde_json::Value;
 
 pub(super) use self::arguments::Arguments;
 use crate::{
-    cli::{output, stop::Signals},
+    cli::{files::exist, output, stop::Signals},
     config::WindowConfig,
     error::Result,
     flow::{COMPLAINTS_MAX, ShotRequest, ShotSearch, ShotSink},
@@ -79,6 +79,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
     let time = arguments.time()?;
     let signals = Signals::heard()?;
     arguments.check_paths()?;
+    // As for pages: nothing is created for a mistyped folder.
+    let folder = arguments.out.as_deref().and_then(Path::parent);
+    if let Some(folder) = folder.filter(|folder| *folder != Path::new("")) {
+        exist(&[folder.to_owned()])?;
+    }
     let filter = arguments.filter();
     let request = ShotRequest {
         paths: &arguments.paths,
