@@ -209,7 +209,7 @@ fn a_lost_file_holds_its_site_until_it_comes() {
     assert_eq!(later_jobs(&life), [("a".to_owned(), JobState::Held)]);
     let text = life.ask("SELECT outcome FROM job WHERE state = 'held'");
     assert!(
-        text[0].contains(&format!("`a.bsp` left kernels/ at {left}")),
+        text[0].contains(&format!("`a.bsp` disappeared from kernels/ at {left}")),
         "{text:?}"
     );
     assert!(world.current("a").is_some(), "products stay served");
@@ -243,8 +243,9 @@ fn a_lost_file_of_several_sites_is_one_alert_and_a_site_may_cease_to_read_it() {
     );
     assert_eq!(alerts.len(), 1, "{alerts:?}");
     assert!(
-        alerts[0]
-            .starts_with("input_lost: 2 sites wait: `both.bc` left kernels/ at 2026-05-01 13:0"),
+        alerts[0].starts_with(
+            "input_lost: 2 sites wait: `both.bc` disappeared from kernels/ at 2026-05-01 13:0"
+        ),
         "{alerts:?}"
     );
     let waiting = |life: &Life| life.shared.read(waits).unwrap();

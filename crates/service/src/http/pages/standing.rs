@@ -77,14 +77,24 @@ pub(super) fn standing(sites: &[Site], faults: &Faults<'_>, times: &Times) -> Ma
     } else {
         "valid"
     };
-    let headline = match (sites.len(), stale, waiting) {
-        (0, ..) => "No sites yet: put site files into the site folder".to_owned(),
-        (all, 0, _) => format!("{}, all of them up to date", counted(all, "site")),
-        (all, stale, 0) => format!("{}, {stale} of them stale", counted(all, "site")),
-        (all, stale, waiting) => format!(
-            "{}: {stale} stale, {waiting} of them waiting for an input",
-            counted(all, "site")
-        ),
+    let refused: usize = wrong.iter().map(|one| one.sites.len()).sum();
+    let parts: Vec<String> = [
+        (stale, "stale"),
+        (waiting, "waiting for an input"),
+        (refused, "not run because of a failure"),
+        (invalid, "with an invalid newest run"),
+        (count("none"), "without a run"),
+    ]
+    .into_iter()
+    .filter(|(sites, _)| *sites > 0)
+    .map(|(sites, what)| format!("{sites} {what}"))
+    .collect();
+    let all = counted(sites.len(), "site");
+    let headline = match (sites.len(), parts.is_empty()) {
+        (0, _) => "No sites yet: put site files into the site folder".to_owned(),
+        (_, true) if worst == "invalid" => all,
+        (_, true) => format!("{all}, all of them up to date"),
+        (_, false) => format!("{all}: {}", parts.join(", ")),
     };
     lead(
         worst,
@@ -101,9 +111,9 @@ pub(super) fn standing(sites: &[Site], faults: &Faults<'_>, times: &Times) -> Ma
                     @for (k, site) in one.sites.iter().enumerate() { @if k > 0 { ", " } a href={ "/sites/" (site) } { (site) } }
                     ": " (prose(one.problem))
                 } }
-                @if invalid > 0 { li { "The newest run of " (counted(invalid, "site")) " is not valid; earlier products stay current." } }
-                @if count("remarks") > 0 { li { (count("remarks")) " valid with remarks." } }
-                @if count("none") > 0 { li { (count("none")) " without a run." } }
+                @if invalid > 0 { li { "The newest run of " (counted(invalid, "site")) " is invalid; earlier products remain current." } }
+                @if worst != "invalid" && count("remarks") > 0 { li { (counted(count("remarks"), "site")) " valid with remarks." } }
+                @if count("none") > 0 { li { (counted(count("none"), "site")) " without a run." } }
             }
         },
     )
@@ -128,8 +138,8 @@ fn cause(wait: &Wait, sites: &[Site]) -> Markup {
         @for (k, site) in wait.sites.iter().enumerate() { @if k > 0 { ", " } a href={ "/sites/" (site) } { (site) } }
         "."
         @match (first, last) {
-            (Some(first), Some(last)) if first != last => { " The products stay those of " (first) " to " (last) "." }
-            (Some(first), _) => { " The products stay those of " (first) "." }
+            (Some(first), Some(last)) if first != last => { " The products of " (first) " to " (last) " remain current." }
+            (Some(first), _) => { " The products of " (first) " remain current." }
             _ => {}
         }
     }
