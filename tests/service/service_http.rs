@@ -733,6 +733,15 @@ fn a_service_that_cannot_work_says_so() {
 }
 
 #[test]
+fn an_unknown_kind_of_events_is_refused() {
+    let world = World::new();
+    let refused = world.get("/events?kind=runs");
+    assert_eq!(refused.status, 400);
+    assert!(refused.text().contains("not a kind of event"));
+    assert_eq!(world.get("/events?kind=").status, 200);
+}
+
+#[test]
 fn a_lost_kernel_is_one_line_and_its_sites_wait() {
     let world = World::new();
     let lost = "`mgs_sc_ext1.bc` disappeared from ck/ at 2026-03-01 01:30 UTC; restore it";
@@ -752,6 +761,9 @@ fn a_lost_kernel_is_one_line_and_its_sites_wait() {
     ] {
         assert!(line.contains(part), "no {part} in {line}");
     }
+    let headline =
+        "4 sites: 2 stale, 2 waiting for an input, 1 with an invalid newest run, 1 without a run<";
+    assert!(home.contains(headline), "{home}");
     let table = "waits</span> for <code>mgs_sc_ext1.bc</code>";
     assert_eq!(home.matches(table).count(), 2, "{home}");
     assert!(home.contains("class=\"site remarks waits\"") && home.contains("dashed frame"));

@@ -24,10 +24,10 @@ use crate::{
     spice::KernelSet,
 };
 
-/// Checks everything that a service requires at its start: configuration, folders, database, port, disk, hooks, site files, kernels.
+/// Checks everything that a service requires at its start.
 ///
-/// One line per subject. Nothing is created or changed; site files are checked as far as possible without reading their
-/// data. Run the check as the user of the service.
+/// One line per subject: configuration, folders, database, port, disk, hooks, site files, kernels. Nothing is created or
+/// changed; site files are checked as far as possible without reading their data. Run the check as the user of the service.
 ///
 /// Exit code: 0 without a failure; otherwise the code of the first failure that prevents the start or, without one, of
 /// the first failure.

@@ -488,6 +488,32 @@ fn a_new_version_plans_every_site_and_runs_those_of_which_something_changed() {
 }
 
 #[test]
+fn a_plan_without_a_change_names_another_program_only_if_there_is_one() {
+    for (prepared, expected) in [
+        (
+            "UPDATE fact SET value = 'another build' WHERE name = 'version'",
+            "tool_changed",
+        ),
+        // A site that is enabled again, or whose file has another name.
+        ("UPDATE site SET round = 0 WHERE name = 'a'", "retry_of"),
+    ] {
+        let (world, life) = two_sites("");
+        let prepare = |transaction: &rusqlite::Transaction<'_>| {
+            transaction.execute(prepared, [])?;
+            Ok(())
+        };
+        life.shared.write(prepare).unwrap();
+        life.kill();
+        std::fs::remove_file(world.path("products/a/working/a/manifest.json")).unwrap();
+        let life = Life::begin(&world);
+        life.settle();
+        life.go_on(&world, 60, 2);
+        let why = life.ask("SELECT kind FROM cause WHERE job = 3");
+        assert_eq!(why, [expected], "{prepared}");
+    }
+}
+
+#[test]
 fn a_damaged_product_is_made_again() {
     let (world, life) = two_sites("");
     let run = &life.ask("SELECT current_run FROM site WHERE name = 'a'")[0];

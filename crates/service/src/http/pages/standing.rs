@@ -61,6 +61,8 @@ pub(super) fn standing(sites: &[Site], faults: &Faults<'_>, times: &Times) -> Ma
     let wrong = refused(sites);
     let invalid = |site: &&Site| site.newest_valid == Some(false);
     let invalid = sites.iter().filter(invalid).count();
+    let without_run = |site: &&Site| site.enabled && site.verdict.is_none();
+    let without_run = sites.iter().filter(without_run).count();
     let problem = faults.configuration.as_deref();
     let worst = if !away.is_empty()
         || !faults.waits.is_empty()
@@ -72,7 +74,7 @@ pub(super) fn standing(sites: &[Site], faults: &Faults<'_>, times: &Times) -> Ma
         || faults.data.products.runs_damaged > 0
     {
         "invalid"
-    } else if stale > 0 || count("none") > 0 {
+    } else if stale > 0 || without_run > 0 {
         "remarks"
     } else {
         "valid"
@@ -83,7 +85,7 @@ pub(super) fn standing(sites: &[Site], faults: &Faults<'_>, times: &Times) -> Ma
         (waiting, "waiting for an input"),
         (refused, "not run because of a failure"),
         (invalid, "with an invalid newest run"),
-        (count("none"), "without a run"),
+        (without_run, "without a run"),
     ]
     .into_iter()
     .filter(|(sites, _)| *sites > 0)
@@ -113,7 +115,6 @@ pub(super) fn standing(sites: &[Site], faults: &Faults<'_>, times: &Times) -> Ma
                 } }
                 @if invalid > 0 { li { "The newest run of " (counted(invalid, "site")) " is invalid; earlier products remain current." } }
                 @if worst != "invalid" && count("remarks") > 0 { li { (counted(count("remarks"), "site")) " valid with remarks." } }
-                @if count("none") > 0 { li { (counted(count("none"), "site")) " without a run." } }
             }
         },
     )
