@@ -85,18 +85,15 @@ pub(super) async fn metrics(_: Reader, State(app): State<Arc<App>>) -> Result<Re
             value: free_mib as f64 * 1_048_576.0,
         }));
     }
-    if let Some(next_ms) = next_night_ms(&config.schedule, now_ms) {
+    let next_ms = next_night_ms(&config.schedule, now_ms);
+    gauges.extend(next_ms.map(|next_ms| {
         let help = "Start of the next night, seconds of UTC since 1970";
-        gauges.push(plain("next_night_seconds", help, next_ms as f64 / 1e3));
-    }
-    if let Some(night_ms) = night_ms {
+        plain("next_night_seconds", help, next_ms as f64 / 1e3)
+    }));
+    gauges.extend(night_ms.map(|night_ms| {
         let help = "End of the last complete night, seconds of UTC since 1970";
-        gauges.push(plain(
-            "last_complete_night_seconds",
-            help,
-            night_ms as f64 / 1e3,
-        ));
-    }
+        plain("last_complete_night_seconds", help, night_ms as f64 / 1e3)
+    }));
     let mut response = app.metrics.text(&gauges).into_response();
     let form = HeaderValue::from_static(OPEN_METRICS);
     response.headers_mut().insert(header::CONTENT_TYPE, form);

@@ -80,24 +80,14 @@ pub(super) fn standing(sites: &[Site], faults: &Faults<'_>, times: &Times) -> Ma
         "valid"
     };
     let refused: usize = wrong.iter().map(|one| one.sites.len()).sum();
-    let parts: Vec<String> = [
+    let parts = [
         (stale, "stale"),
         (waiting, "waiting for an input"),
         (refused, "not run because of a failure"),
         (invalid, "with an invalid newest run"),
         (without_run, "without a run"),
-    ]
-    .into_iter()
-    .filter(|(sites, _)| *sites > 0)
-    .map(|(sites, what)| format!("{sites} {what}"))
-    .collect();
-    let all = counted(sites.len(), "site");
-    let headline = match (sites.len(), parts.is_empty()) {
-        (0, _) => "No sites yet: put site files into the site folder".to_owned(),
-        (_, true) if worst == "invalid" => all,
-        (_, true) => format!("{all}, all of them up to date"),
-        (_, false) => format!("{all}: {}", parts.join(", ")),
-    };
+    ];
+    let headline = headline(sites.len(), &parts, worst);
     lead(
         worst,
         &headline,
@@ -118,6 +108,21 @@ pub(super) fn standing(sites: &[Site], faults: &Faults<'_>, times: &Times) -> Ma
             }
         },
     )
+}
+
+/// All sites, and how many of them are not as they should be.
+fn headline(sites: usize, parts: &[(usize, &str)], worst: &str) -> String {
+    let parts = parts.iter().filter(|(sites, _)| *sites > 0);
+    let parts: Vec<String> = parts
+        .map(|(sites, what)| format!("{sites} {what}"))
+        .collect();
+    let all = counted(sites, "site");
+    match (sites, parts.is_empty()) {
+        (0, _) => "No sites yet: put site files into the site folder".to_owned(),
+        (_, true) if worst == "invalid" => all,
+        (_, true) => format!("{all}, all of them up to date"),
+        (_, false) => format!("{all}: {}", parts.join(", ")),
+    }
 }
 
 /// A lost or unusable file, the sites that wait for it, and the age of their products.
