@@ -85,7 +85,7 @@ impl Service {
 /// The subjects of faults.
 fn faults(answer: &Value) -> Vec<&str> {
     let findings = answer["findings"].as_array().unwrap().iter();
-    let faults = findings.filter(|finding| finding["state"] == "fault");
+    let faults = findings.filter(|finding| finding["state"] == "failure");
     faults
         .map(|fault| fault["subject"].as_str().unwrap())
         .collect()
@@ -116,10 +116,10 @@ fn a_configuration_is_complete_valid_and_written_once() {
     };
     assert!(refused(&service.path("")).contains("already exists"));
     assert_eq!(text(&service.path("areograph.toml")), written);
-    // A mistyped folder above, and a file: nothing is created.
-    assert!(refused(&service.folder.path().join("typo/mars")).contains("folder above"));
+    // A mistyped parent folder, and a file: nothing is created.
+    assert!(refused(&service.folder.path().join("typo/mars")).contains("parent folder"));
     assert!(!service.folder.path().join("typo").exists());
-    assert!(refused(&service.path("areograph.toml/mars")).contains("folder above"));
+    assert!(refused(&service.path("areograph.toml/mars")).contains("parent folder"));
     fs::write(service.path("file"), "").unwrap();
     assert!(refused(&service.path("file")).contains("not a folder"));
 }

@@ -598,7 +598,7 @@ const PAGES: &[(&str, &[&str])] = &[
     ),
     (
         "/sites/gamma",
-        &["is not valid and did not become current", "limit 50 m"],
+        &["is invalid and did not become current", "limit 50 m"],
     ),
     ("/jobs", &["crashes at stage register", "href=\"/jobs/4\""]),
     ("/jobs?state=running", &["beta"]),
@@ -733,25 +733,37 @@ fn a_service_that_cannot_work_says_so() {
 }
 
 #[test]
+fn an_unknown_kind_of_events_is_refused() {
+    let world = World::new();
+    let refused = world.get("/events?kind=runs");
+    assert_eq!(refused.status, 400);
+    assert!(refused.text().contains("not a kind of event"));
+    assert_eq!(world.get("/events?kind=").status, 200);
+}
+
+#[test]
 fn a_lost_kernel_is_one_line_and_its_sites_wait() {
     let world = World::new();
-    let lost = "`mgs_sc_ext1.bc` left ck/ at 2026-03-01 01:30 UTC; put the file back";
+    let lost = "`mgs_sc_ext1.bc` disappeared from ck/ at 2026-03-01 01:30 UTC; restore it";
     world.sql(&format!(
         "UPDATE file_version SET state = 'gone' WHERE path LIKE '%mgs_sc_ext1.bc';
          UPDATE site_input SET blake3 = NULL;
          UPDATE site SET problem = '{lost}', stale_because = '{lost}', stale_since_ms = 1 WHERE name IN ('alpha', 'beta')",
     ));
     let home = world.get("/").text();
-    assert_eq!(home.matches("left ck/ at").count(), 1, "{home}");
-    let line = between(&home, "<code>mgs_sc_ext1.bc</code> left", '\n');
+    assert_eq!(home.matches("disappeared from ck/ at").count(), 1, "{home}");
+    let line = between(&home, "<code>mgs_sc_ext1.bc</code> disappeared", '\n');
     for part in [
         "2 sites wait for it: ",
         "href=\"/sites/alpha\"",
         "href=\"/sites/beta\"",
-        "The products stay those of 2026-02-28 02:30 UTC.",
+        "The products of 2026-02-28 02:30 UTC remain current.",
     ] {
         assert!(line.contains(part), "no {part} in {line}");
     }
+    let headline =
+        "4 sites: 2 stale, 2 waiting for an input, 1 with an invalid newest run, 1 without a run<";
+    assert!(home.contains(headline), "{home}");
     let table = "waits</span> for <code>mgs_sc_ext1.bc</code>";
     assert_eq!(home.matches(table).count(), 2, "{home}");
     assert!(home.contains("class=\"site remarks waits\"") && home.contains("dashed frame"));

@@ -1,7 +1,8 @@
-//! What a service would meet at its start, without starting one: nothing is created or changed.
+//! Everything that a service requires at its start, without starting one: nothing is created or changed.
 
 use std::{
-    fs::{self, File, TryLockError},
+    fs,
+    io::ErrorKind::{NotADirectory, NotFound},
     net::TcpListener,
     path::{Path, PathBuf},
 };
@@ -17,7 +18,7 @@ use super::{
         hooks::program_of,
         schedule::next_night_ms,
     },
-    lock::{LOCK, owner_of, refuse_network},
+    lock::{LOCK, Owner, refuse_network},
     recover::refuse_foreign,
     start::never_seen,
     words::counted,
@@ -32,20 +33,20 @@ pub struct Finding {
     pub subject: &'static str,
     /// Where it is: a file, a folder, an address.
     pub place: String,
-    /// What was found, or the fault.
+    /// What was found, or the failure.
     pub found: Result<String>,
-    /// Whether a fault stops a service from starting; otherwise it starts, and the subject does not work.
+    /// Whether a failure prevents the start; otherwise the service starts, and the subject does not work.
     pub stops: bool,
 }
 
-/// Faults that a service reports only once it needs the subject.
+/// Failures that a service reports only once it needs the subject.
 #[derive(Debug, thiserror::Error, Cause)]
 enum Fault {
     #[error("the folder cannot be written by this user")]
     #[cause(Io: "give the folder to the user of the service, or name another folder in [outputs]")]
     NotWritable,
     #[error(
-        "{left_mib} MiB are free, less than workers.min_free_mib = {least_mib}: no site would start"
+        "{left_mib} MiB are free, less than workers.min_free_mib = {least_mib}: no run would start"
     )]
     #[cause(Io: "free some space, or lower workers.min_free_mib")]
     NoRoom { left_mib: u64, least_mib: u64 },
@@ -70,7 +71,6 @@ pub fn check(config: &ServiceConfig, now_ms: i64) -> Vec<Finding> {
     let next = next.map_or_else(String::new, |next| format!("the next night is {next}"));
     note("schedule", &config.schedule.cron, true, Ok(next));
     let (state, products) = (&config.outputs.state, &config.outputs.products);
-    let running = running(state);
     note("state", &state.display(), true, state_folder(state));
     note("products", &products.display(), true, writable(products));
     let database = look_at(state);
@@ -92,26 +92,21 @@ pub fn check(config: &ServiceConfig, now_ms: i64) -> Vec<Finding> {
         })
     });
     note("database", &state.display(), true, layout);
-    for folder in folders(&config.inputs).unwrap_or_default() {
-        let is_known = known.contains(&folder.path);
-        let (stops, found) = input_folder(&folder, is_known, &config.file);
-        note(folder.kind.name(), &folder.path, stops, found);
+    match folders(&config.inputs) {
+        Ok(folders) => {
+            for folder in folders {
+                let is_known = known.contains(&folder.path);
+                let (stops, found) = input_folder(&folder, is_known, &config.file);
+                note(folder.kind.name(), &folder.path, stops, found);
+            }
+        }
+        Err(failure) => {
+            let failure = Err(failure).in_file(&config.file);
+            note("folders", &config.file.display(), true, failure);
+        }
     }
     for folder in [products, state] {
-        let least_mib = u64::from(config.workers.min_free_mib);
-        let room = free_mib(&above(folder)).map_or_else(
-            || Ok("the system does not report the free space".to_owned()),
-            |left_mib| {
-                if left_mib < least_mib {
-                    let fault = Fault::NoRoom {
-                        left_mib,
-                        least_mib,
-                    };
-                    return Err(fault).in_file(folder);
-                }
-                Ok(format!("{left_mib} MiB free"))
-            },
-        );
+        let room = room(folder, u64::from(config.workers.min_free_mib));
         note("disk", &folder.display(), false, room);
     }
     for hook in &config.hooks {
@@ -121,22 +116,45 @@ pub fn check(config: &ServiceConfig, now_ms: i64) -> Vec<Finding> {
         note("hook", &named, false, found.in_file(&config.file));
     }
     let address = config.http.listen;
-    match running {
-        Some(owner) => note("service", &address, false, Ok(format!("runs now: {owner}"))),
-        None => note("port", &address, true, port(config)),
+    match running(state) {
+        Ok(Some(owner)) => {
+            let text = format!("runs now: {}", owner.words());
+            note("service", &address, false, Ok(text));
+        }
+        Ok(None) => note("port", &address, true, port(config)),
+        Err(failure) => note("service", &address, true, Err(failure)),
     }
     findings
 }
 
-/// The service that uses a state folder now.
-fn running(state: &Path) -> Option<String> {
+/// The service that uses a state folder now, by its record. The lock is not tried: a service that starts at this moment
+/// would be refused.
+fn running(state: &Path) -> Result<Option<Owner>> {
     let path = state.join(LOCK);
-    match File::open(&path).ok()?.try_lock_shared() {
-        Err(TryLockError::WouldBlock) => Some(owner_of(&path).map_or_else(
-            || "a process that does not state its number".to_owned(),
-            |owner| owner.words(),
-        )),
-        _ => None,
+    match fs::read(&path) {
+        // A record that is not whole is that of a service which does not listen yet.
+        Ok(record) => {
+            let owner = serde_json::from_slice(&record).ok();
+            Ok(owner.filter(Owner::runs))
+        }
+        // The finding of the state folder reports a file in its place.
+        Err(error) if matches!(error.kind(), NotFound | NotADirectory) => Ok(None),
+        Err(error) => Err(IoError::on("read")(error)).in_file(path),
+    }
+}
+
+/// The free space for a folder.
+fn room(folder: &Path, least_mib: u64) -> Result<String> {
+    match free_mib(&above(folder)) {
+        None => Ok("the system does not report the free space".to_owned()),
+        Some(left_mib) if left_mib < least_mib => {
+            let failure = Fault::NoRoom {
+                left_mib,
+                least_mib,
+            };
+            Err(failure).in_file(folder)
+        }
+        Some(left_mib) => Ok(format!("{left_mib} MiB free")),
     }
 }
 
@@ -168,22 +186,23 @@ fn writable(folder: &Path) -> Result<String> {
     Ok(text.to_owned())
 }
 
-/// A folder of inputs, and whether its fault stops a service. One that was available before may be away.
+/// A folder of inputs, and whether its failure prevents the start. One that was available before may be unavailable.
 fn input_folder(folder: &Folder, is_known: bool, file: &Path) -> (bool, Result<String>) {
     let path = Path::new(&folder.path);
     if !path.is_dir() {
         if is_known {
             return (
                 false,
-                Ok("away: its sites wait until it is back".to_owned()),
+                Ok("unavailable: its sites wait until it is available again".to_owned()),
             );
         }
         return (true, Err(never_seen(folder)).in_file(file));
     }
-    let listed = fs::read_dir(path)
+    let count = fs::read_dir(path)
+        .and_then(|mut entries| entries.try_fold(0, |count, entry| entry.map(|_| count + 1)))
         .map_err(IoError::on("list the folder"))
         .in_file(path);
-    let found = listed.map(|entries| match entries.count() {
+    let found = count.map(|count| match count {
         0 => "empty".to_owned(),
         count => counted(count, "item"),
     });

@@ -60,6 +60,13 @@ impl Owner {
         format!("areograph {} (process {})", self.command, self.pid)
     }
 
+    /// Whether its process runs; a later process may have the same number.
+    pub(crate) fn runs(&self) -> bool {
+        let arguments = fs::read(format!("/proc/{}/cmdline", self.pid)).unwrap_or_default();
+        let mut arguments = arguments.split(|byte| *byte == 0);
+        arguments.any(|argument| argument == self.command.as_bytes())
+    }
+
     /// The alternative to the end of its process, if it has pages.
     fn page_or(&self) -> String {
         if self.address.is_empty() {
@@ -119,7 +126,7 @@ impl ServiceLock {
     }
 }
 
-pub(crate) fn owner_of(path: &Path) -> Option<Owner> {
+fn owner_of(path: &Path) -> Option<Owner> {
     serde_json::from_slice(&fs::read(path).ok()?).ok()
 }
 

@@ -2,7 +2,6 @@
 
 use std::{
     collections::BTreeMap,
-    fs,
     path::{Path, PathBuf},
 };
 
@@ -18,18 +17,20 @@ use crate::{
     service::{
         check::{Finding, check},
         clock::Clock,
+        engine::listing::site_files,
         start::configuration,
         words::counted,
     },
     spice::KernelSet,
 };
 
-/// Checks what a service would meet at its start: configuration, folders, database, port, disk, hooks, site files, kernels.
+/// Checks everything that a service requires at its start.
 ///
-/// One line per subject. Nothing is created or changed; site files are checked as far as possible without reading their
-/// data. Run the check as the user of the service.
+/// One line per subject: configuration, folders, database, port, disk, hooks, site files, kernels. Nothing is created or
+/// changed; site files are checked as far as possible without reading their data. Run the check as the user of the service.
 ///
-/// Exit code: 0 without a fault, otherwise that of the first fault that stops the service, or of the first fault.
+/// Exit code: 0 without a failure; otherwise the code of the first failure that prevents the start or, without one, of
+/// the first failure.
 ///
 /// Example: areograph service check /etc/areograph/areograph.toml
 #[derive(Debug, Args)]
@@ -78,7 +79,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
         .into_iter()
         .filter(|finding| finding.found.is_err());
     let mut faults: Vec<Finding> = faults.collect();
-    // The first fault that stops the service determines the exit code.
+    // The first failure that prevents the start determines the exit code.
     faults.sort_by_key(|fault| !fault.stops);
     let mut faults = faults.into_iter().filter_map(|fault| fault.found.err());
     let decides = faults.next();
@@ -103,7 +104,7 @@ fn of_file(
 fn document(finding: &Finding) -> serde_json::Value {
     let (state, text) = match &finding.found {
         Ok(text) => ("ok", text.clone()),
-        Err(fault) => ("fault", fault.to_string()),
+        Err(fault) => ("failure", fault.to_string()),
     };
     json!({
         "subject": finding.subject,
@@ -126,11 +127,11 @@ fn print(findings: &[Finding], starts: bool) {
         output::line(match found {
             Ok(text) if text.is_empty() => format!("ok     {subject:13}  {place}"),
             Ok(text) => format!("ok     {subject:13}  {place}: {text}"),
-            Err(_) => format!("FAULT  {subject:13}  {place}"),
+            Err(_) => format!("FAILED {subject:13}  {place}"),
         });
     }
     let faults = findings.iter().filter(|finding| finding.found.is_err());
-    let faults = counted(faults.count(), "fault");
+    let faults = counted(faults.count(), "failure");
     let not = if starts { "" } else { "NOT " };
     output::line(format_args!("the service would {not}start; {faults}"));
 }
@@ -143,15 +144,12 @@ fn sites(config: &ServiceConfig) -> Vec<Finding> {
         .flatten()
         .cloned()
         .collect();
-    let is_site = |path: &PathBuf| path.extension().is_some_and(|ending| ending == "toml");
+    // A folder that cannot be listed is a finding of its own.
     let listed = inputs
         .sites
         .iter()
-        .filter_map(|folder| fs::read_dir(folder).ok());
-    let entries = listed
-        .flatten()
-        .filter_map(|entry| Some(entry.ok()?.path()));
-    let mut files: Vec<PathBuf> = entries.filter(is_site).collect();
+        .filter_map(|folder| site_files(folder).ok());
+    let mut files: Vec<PathBuf> = listed.flatten().collect();
     files.sort();
     let mut named: BTreeMap<String, PathBuf> = BTreeMap::new();
     let read = InputFiles::default();

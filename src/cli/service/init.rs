@@ -24,7 +24,7 @@ const FILE: &str = "areograph.toml";
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
-    /// Folder of the service; the folder above it must exist.
+    /// Folder of the service; the parent folder must exist.
     #[arg(value_name = "DIR")]
     folder: PathBuf,
 }
@@ -39,8 +39,8 @@ enum Refused {
     #[error("not a folder")]
     #[cause("name a new folder, or an existing one without a configuration")]
     NotAFolder,
-    #[error("the folder above does not exist")]
-    #[cause("check the path; create the folder above first if it is intended")]
+    #[error("the parent folder does not exist")]
+    #[cause("check the path, or create the parent folder")]
     NothingAbove,
 }
 

@@ -6,6 +6,9 @@ use rusqlite::{Connection, OptionalExtension as _, Row, Transaction, params};
 
 use super::Stored;
 
+/// The round of a site that requires a plan because another program made its products.
+pub const OTHER_PROGRAM: i64 = -1;
+
 /// State of a site.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SiteRow {
@@ -27,8 +30,16 @@ pub struct SiteRow {
     pub stale_since_ms: Option<i64>,
     /// The reason.
     pub stale_because: Option<String>,
-    /// The round of that comparison; 0: a plan is required.
+    /// The round of that comparison; 0 or [`OTHER_PROGRAM`]: a plan is required.
     pub round: i64,
+}
+
+impl SiteRow {
+    /// Whether a plan is required.
+    #[must_use]
+    pub fn needs_plan(&self) -> bool {
+        self.round <= 0
+    }
 }
 
 /// All sites, by name.
@@ -131,6 +142,15 @@ pub fn put_checked(transaction: &Transaction<'_>, name: &str, checked: &Checked<
             bound(3),
         ],
     )?;
+    Ok(())
+}
+
+/// Records that every site requires a plan: with `round` 0, or [`OTHER_PROGRAM`].
+///
+/// # Errors
+/// SQLite errors.
+pub fn require_plans(transaction: &Transaction<'_>, round: i64) -> Stored<()> {
+    transaction.execute("UPDATE site SET round = ?1", [round])?;
     Ok(())
 }
 

@@ -39,16 +39,21 @@ impl Wait {
     }
 }
 
-/// The start of the text about a lost file.
+/// The start of the text about a lost file, by which it is recognised.
 fn loss(path: &str) -> String {
-    format!("`{}` left ", file_name(Path::new(path)))
+    format!("`{}` disappeared from ", file_name(Path::new(path)))
 }
 
-/// The input of a site that left its folder and that `refusal`, the reason for which the site cannot be planned, names.
+/// The text about the first input of a site that left its folder and that the reason for which the site cannot be
+/// planned names, as `is_named` decides from its path.
 ///
 /// # Errors
 /// SQLite errors.
-pub fn lost_input(connection: &Connection, site: &str, refusal: &str) -> Stored<Option<String>> {
+pub fn lost_input(
+    connection: &Connection,
+    site: &str,
+    is_named: impl Fn(&str) -> bool,
+) -> Stored<Option<String>> {
     let mut query = connection.prepare_cached(
         "SELECT f.path, f.changed_ms FROM site_input i JOIN file_version f ON f.path = i.path
          WHERE i.site = ?1 AND f.state = 'gone' ORDER BY f.path",
@@ -56,10 +61,10 @@ pub fn lost_input(connection: &Connection, site: &str, refusal: &str) -> Stored<
     let mut rows = query.query(params![site])?;
     while let Some(row) = rows.next()? {
         let path: String = row.get(0)?;
-        if refusal.contains(&file_name(Path::new(&path))) {
+        if is_named(&path) {
             let folder = Path::new(&path).parent().map(file_name);
             return Ok(Some(format!(
-                "{}{}/ at {}; put the file back, or remove it from the files of its sites",
+                "{}{}/ at {}; restore it, or remove it from the site files that name it",
                 loss(&path),
                 folder.unwrap_or_default(),
                 minute_text(row.get(1)?)

@@ -17,7 +17,7 @@ use crate::{
         attempts::Attempt as AttemptRow,
         facts, jobs_in,
         runs::{put_current, put_run, reserve_job, run},
-        sites::{SiteRow, sites},
+        sites::{OTHER_PROGRAM, SiteRow, require_plans, sites},
     },
     record::record,
     state::JobState,
@@ -190,7 +190,9 @@ fn new_version<W: Workers>(core: &Core<W>) -> Stored<()> {
     core.shared.write(|transaction| {
         let before = facts::fact(transaction, facts::TOOL_VERSION)?;
         if before.as_deref() != Some(&build) {
-            transaction.execute("UPDATE site SET round = 0", [])?;
+            // A database without this fact does not know the former program.
+            let round = before.map_or(0, |_| OTHER_PROGRAM);
+            require_plans(transaction, round)?;
             facts::note(transaction, facts::TOOL_VERSION, &build)?;
         }
         Ok(())

@@ -110,7 +110,7 @@ pub fn tell_waits(
     for subject in ended {
         put_alert_state(transaction, now_ms, &subject, "well")?;
         let name = file_name(subject.trim_start_matches(SUBJECT).as_ref());
-        let text = format!("no site waits for `{name}` any more");
+        let text = format!("no site waits for `{name}` any longer");
         alert(AlertKind::Recovered, &text, &Value::Null)?;
     }
     Ok(())

@@ -2,7 +2,6 @@
 //! indexes and then for each site file.
 
 use std::{
-    fs,
     path::{Path, PathBuf},
     process::Stdio,
     time::Duration,
@@ -20,6 +19,7 @@ use tokio::{
 use super::{
     alerts::{Alert, tell_edge},
     core::Core,
+    listing::site_files,
     workers::Workers,
 };
 use crate::database::{About, Stored, append};
@@ -53,7 +53,7 @@ async fn fetch<W: Workers>(core: &Core<W>) -> Stored<()> {
         Outcome::Failed(why) => failures.push(format!("indexes: {why}")),
         Outcome::Done => {
             let folders = config.inputs.sites.clone();
-            let sites = spawn_blocking(move || site_files(&folders)).await;
+            let sites = spawn_blocking(move || files_of_sites(&folders)).await;
             for site in sites.unwrap_or_default() {
                 match run(core, &config, What::Site(&site)).await {
                     Outcome::Stopped => return Ok(()),
@@ -94,16 +94,9 @@ async fn fetch<W: Workers>(core: &Core<W>) -> Stored<()> {
 }
 
 /// Files of sites, in order; a folder that cannot be read has none, as its poll reports.
-fn site_files(folders: &[PathBuf]) -> Vec<PathBuf> {
-    let entries = folders
-        .iter()
-        .filter_map(|folder| fs::read_dir(folder).ok());
-    let paths = entries.flatten().flatten().map(|entry| entry.path());
-    let is_site = |path: &PathBuf| {
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        !name.starts_with('.') && name.ends_with(".toml") && path.is_file()
-    };
-    let mut files: Vec<PathBuf> = paths.filter(is_site).collect();
+fn files_of_sites(folders: &[PathBuf]) -> Vec<PathBuf> {
+    let listed = folders.iter().filter_map(|folder| site_files(folder).ok());
+    let mut files: Vec<PathBuf> = listed.flatten().collect();
     files.sort();
     files
 }
@@ -198,21 +191,5 @@ mod tests {
         let long = format!("{}the reason", "x".repeat(100_000));
         let end = end_of(long.as_bytes()).await;
         assert!(end.len() == COMPLAINT_MAX && end.ends_with("the reason"));
-    }
-
-    #[test]
-    fn site_files_are_those_of_polls() {
-        let folder = tempfile::tempdir().unwrap();
-        for name in ["b.toml", "a.toml", ".c.toml", "d.geojson"] {
-            fs::File::create(folder.path().join(name))
-                .map(drop)
-                .unwrap();
-        }
-        fs::create_dir(folder.path().join("e.toml")).unwrap();
-        let found = site_files(&[folder.path().to_owned(), folder.path().join("none")]);
-        assert_eq!(
-            found,
-            ["a.toml", "b.toml"].map(|name| folder.path().join(name))
-        );
     }
 }

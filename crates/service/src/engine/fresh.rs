@@ -34,7 +34,7 @@ pub fn refresh(transaction: &Transaction<'_>, now_ms: i64, only: Option<&str>) -
     let newest = newest_jobs(transaction, only)?;
     for site in sites.iter().filter(|site| site.enabled) {
         let stale = match waits.of(&site.name) {
-            Some(why) if site.round > 0 => Some((now_ms, why)),
+            Some(why) if !site.needs_plan() => Some((now_ms, why)),
             _ => by_job(transaction, site, newest.get(&site.name))?,
         };
         match stale {

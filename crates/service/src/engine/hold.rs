@@ -36,7 +36,7 @@ impl NotReady {
         self.to_plan(site).or_else(|| self.lost.get(site).cloned())
     }
 
-    /// The reason for which a site cannot even be planned. A lost file is none: the site may cease to name it.
+    /// The reason for which a site cannot even be planned. A lost file is not such a reason: the site may no longer name it.
     #[must_use]
     pub fn to_plan(&self, site: &str) -> Option<String> {
         if self.planned.contains(site) {

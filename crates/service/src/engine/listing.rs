@@ -2,9 +2,9 @@
 
 use std::{
     collections::BTreeMap,
-    fs::File,
-    io::{BufRead as _, BufReader},
-    path::Path,
+    fs::{self, File},
+    io::{self, BufRead as _, BufReader},
+    path::{Path, PathBuf},
 };
 
 use crate::{
@@ -55,6 +55,18 @@ pub fn read_list(
     Err("the file list of the folder is incomplete".to_owned())
 }
 
+/// Site files of a folder, in order.
+///
+/// # Errors
+/// The folder cannot be listed.
+pub fn site_files(folder: &Path) -> io::Result<Vec<PathBuf>> {
+    let paths = fs::read_dir(folder)?.map(|entry| Ok(entry?.path()));
+    let mut files = paths.collect::<io::Result<Vec<_>>>()?;
+    files.retain(|path| counts(path, folder, RootKind::Sites) && path.is_file());
+    files.sort();
+    Ok(files)
+}
+
 /// Whether a file is an input: site files are directly in their folder, and rsync and others give unfinished files
 /// recognisable names.
 fn counts(path: &Path, root: &Path, kind: RootKind) -> bool {
@@ -71,6 +83,18 @@ fn counts(path: &Path, root: &Path, kind: RootKind) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn site_files_are_those_of_polls() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["b.toml", "a.toml", ".c.toml", "d.toml~", "d.geojson"] {
+            File::create(folder.path().join(name)).map(drop).unwrap();
+        }
+        fs::create_dir(folder.path().join("e.toml")).unwrap();
+        let expected = ["a.toml", "b.toml"].map(|name| folder.path().join(name));
+        assert_eq!(site_files(folder.path()).unwrap(), expected);
+        assert!(site_files(&folder.path().join("none")).is_err());
+    }
 
     #[test]
     fn files_under_way_do_not_count() {

@@ -31,6 +31,7 @@ pub mod fresh;
 pub mod hold;
 pub mod hooks;
 pub mod listing;
+mod losses;
 pub mod nights;
 pub mod plans;
 pub mod poll;

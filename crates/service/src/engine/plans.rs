@@ -10,6 +10,7 @@ use super::{
     core::{Core, working},
     folders::{Folder, as_listed, role},
     fresh::refresh,
+    losses::is_named,
     reasons::{change_text, decision},
     workers::{Workers, words},
 };
@@ -19,13 +20,13 @@ use crate::{
         files::{FileState, file},
         pending_job,
         runs::{is_run, run},
-        sites::{Checked, SiteInput, SiteRow, inputs_of, put_checked, put_inputs},
+        sites::{Checked, OTHER_PROGRAM, SiteInput, SiteRow, inputs_of, put_checked, put_inputs},
         waits::lost_input,
     },
     state::JobState,
     worker::{
         parent::How,
-        protocol::{Answer, PlanAnswer, What},
+        protocol::{Answer, Failure, PlanAnswer, What},
     },
 };
 use areograph_base::error::Kind;
@@ -66,7 +67,7 @@ pub async fn plan<W: Workers>(
     let now_ms = core.now_ms();
     let planned = match &ended.answer {
         Some(Ok(Answer::Plan(answer))) => Planned::Answer(answer),
-        Some(Err(failure)) if is_final(failure.code) => Planned::Refused(&failure.text),
+        Some(Err(failure)) if is_final(failure.code) => Planned::Refused(failure),
         // A kernel that crashes CSPICE: the following job reports it.
         None if matches!(ended.how, How::Signalled(_)) => Planned::Crashed(words(&ended)),
         // Retried in the next round.
@@ -89,41 +90,13 @@ pub async fn plan<W: Workers>(
         night,
         now_ms,
     };
-    core.shared.write(|transaction| {
-        let lost = match &planned {
-            Planned::Refused(text) => lost_input(transaction, context.name(), text)?,
-            _ => None,
-        };
-        let note = match planned {
-            Planned::Answer(answer) => context.answered(transaction, answer)?,
-            Planned::Refused(text) => {
-                let text = lost.as_deref().unwrap_or(text);
-                context.refused(transaction, text, Some(text))?
-            }
-            Planned::Crashed(text) => context.refused(transaction, &text, None)?,
-        };
-        // A lost file is reported once for all sites that read it.
-        if lost.is_none() {
-            tracing::info!(site = site.name, "{note}");
-        }
-        let about = About {
-            site: Some(&site.name),
-            ..About::default()
-        };
-        append(
-            transaction,
-            now_ms,
-            "checked",
-            about,
-            &json!({ "text": note }),
-        )?;
-        refresh(transaction, now_ms, Some(&site.name))
-    })
+    core.shared
+        .write(|transaction| context.record(transaction, &planned))
 }
 
 enum Planned<'a> {
     Answer(&'a PlanAnswer),
-    Refused(&'a str),
+    Refused(&'a Failure),
     Crashed(String),
 }
 
@@ -147,6 +120,34 @@ struct Context<'a> {
 impl Context<'_> {
     fn name(&self) -> &str {
         &self.candidate.site.name
+    }
+
+    fn record(&self, transaction: &Transaction<'_>, planned: &Planned<'_>) -> Stored<()> {
+        let lost = match planned {
+            Planned::Refused(failure) => lost_input(transaction, self.name(), |path| {
+                is_named(failure, self.folders, Path::new(path))
+            })?,
+            _ => None,
+        };
+        let note = match planned {
+            Planned::Answer(answer) => self.answered(transaction, answer)?,
+            Planned::Refused(failure) => {
+                let text = lost.as_deref().unwrap_or(&failure.text);
+                self.refused(transaction, text, Some(text))?
+            }
+            Planned::Crashed(text) => self.refused(transaction, text, None)?,
+        };
+        // A lost file is reported once for all sites that read it.
+        if lost.is_none() {
+            tracing::info!(site = self.name(), "{note}");
+        }
+        let about = About {
+            site: Some(self.name()),
+            ..About::default()
+        };
+        let data = json!({ "text": note });
+        append(transaction, self.now_ms, "checked", about, &data)?;
+        refresh(transaction, self.now_ms, Some(self.name()))
     }
 
     fn answered(&self, transaction: &Transaction<'_>, answer: &PlanAnswer) -> Stored<String> {
@@ -220,7 +221,7 @@ impl Context<'_> {
         put_inputs(transaction, self.name(), &inputs)?;
         self.checked(transaction, None, problem, text)?;
         let is_new =
-            self.candidate.site.round == 0 || pending_job(transaction, self.name())?.is_some();
+            self.candidate.site.needs_plan() || pending_job(transaction, self.name())?.is_some();
         if causes.is_empty() && (is_new || self.night.is_some()) {
             let (kind, _) = self.without_change(transaction)?;
             causes.push(CauseRow::plain(kind, text, self.now_ms));
@@ -323,8 +324,8 @@ impl Context<'_> {
         let site = &self.candidate.site;
         let pending = pending_job(connection, &site.name)?.is_some();
         Ok(match &site.current_run {
-            None if site.round == 0 && !pending => (CauseKind::First, "the site is new"),
-            Some(_) if site.round == 0 => (
+            None if site.needs_plan() && !pending => (CauseKind::First, "the site is new"),
+            Some(_) if site.round == OTHER_PROGRAM && !pending => (
                 CauseKind::ToolChanged,
                 "this build of areograph computes stages differently",
             ),

@@ -7,6 +7,7 @@ use std::{
     time::{Duration, Instant},
 };
 
+use rusqlite::Transaction;
 use serde_json::json;
 use tokio::task::JoinSet;
 
@@ -37,7 +38,7 @@ use crate::{
     engine::retry::milliseconds,
     worker::protocol::{Answer, What},
 };
-use areograph_config::AlertKind;
+use areograph_config::{AlertKind, ServiceConfig};
 use areograph_store::files::Identity;
 
 /// The purpose of a round.
@@ -194,29 +195,39 @@ fn note_poll<W: Workers>(
                 wake_blocked(transaction, now_ms, &now.path)?;
             }
         }
-        let gone = format!("{} is not available: {}", now.path, now.detail);
-        let back = format!("{} is available again", now.path);
-        let alert = |kind, text| Alert {
-            kind,
-            site: None,
-            run: None,
-            text,
-        };
-        tell_edge(
-            transaction,
-            &config,
-            now_ms,
-            (
-                &format!("root {}", now.path),
-                now.state == RootState::Unavailable,
-            ),
-            (
-                &alert(AlertKind::RootUnavailable, &gone),
-                Some(&alert(AlertKind::RootBack, &back)),
-            ),
-        )
+        tell_root(transaction, &config, now_ms, &now)
     })?;
     Ok(settled)
+}
+
+/// Reports that a folder is unavailable, or available again.
+fn tell_root(
+    transaction: &Transaction<'_>,
+    config: &ServiceConfig,
+    now_ms: i64,
+    root: &RootRow,
+) -> Stored<()> {
+    let gone = format!("{} is not available: {}", root.path, root.detail);
+    let back = format!("{} is available again", root.path);
+    let alert = |kind, text| Alert {
+        kind,
+        site: None,
+        run: None,
+        text,
+    };
+    tell_edge(
+        transaction,
+        config,
+        now_ms,
+        (
+            &format!("root {}", root.path),
+            root.state == RootState::Unavailable,
+        ),
+        (
+            &alert(AlertKind::RootUnavailable, &gone),
+            Some(&alert(AlertKind::RootBack, &back)),
+        ),
+    )
 }
 
 /// Result of a comparison of all sites.
@@ -235,7 +246,7 @@ fn candidates(
 ) -> Stored<Compared> {
     let mut changed = changed_inputs(connection)?;
     let all: Vec<SiteRow> = sites(connection)?;
-    let planned = all.iter().filter(|site| site.enabled && site.round > 0);
+    let planned = all.iter().filter(|site| site.enabled && !site.needs_plan());
     let oldest = planned.map(|site| site.round).min().unwrap_or(i64::MAX);
     let new = files_since(connection, oldest)?;
     let mut compared = Compared {
@@ -252,11 +263,11 @@ fn candidates(
             new.iter()
                 .any(|(path, round)| *round > site.round && file.reaches(path))
         };
-        let reached = site.round > 0 && file.is_some_and(reached);
+        let reached = !site.needs_plan() && file.is_some_and(reached);
         let again = purpose.night.is_some()
             && site.stale_since_ms.is_some()
             && pending_job(connection, &site.name)?.is_none();
-        if site.round == 0 || !changed.is_empty() || reached || again {
+        if site.needs_plan() || !changed.is_empty() || reached || again {
             compared.candidates.push(Candidate { site, changed });
         } else {
             compared.unchanged.push(site.name);

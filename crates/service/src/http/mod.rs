@@ -23,6 +23,7 @@ mod coverage;
 mod extract;
 mod files;
 mod frame;
+mod groups;
 mod guard;
 mod logs;
 mod metrics;

@@ -209,7 +209,7 @@ fn a_lost_file_holds_its_site_until_it_comes() {
     assert_eq!(later_jobs(&life), [("a".to_owned(), JobState::Held)]);
     let text = life.ask("SELECT outcome FROM job WHERE state = 'held'");
     assert!(
-        text[0].contains(&format!("`a.bsp` left kernels/ at {left}")),
+        text[0].contains(&format!("`a.bsp` disappeared from kernels/ at {left}")),
         "{text:?}"
     );
     assert!(world.current("a").is_some(), "products stay served");
@@ -243,8 +243,9 @@ fn a_lost_file_of_several_sites_is_one_alert_and_a_site_may_cease_to_read_it() {
     );
     assert_eq!(alerts.len(), 1, "{alerts:?}");
     assert!(
-        alerts[0]
-            .starts_with("input_lost: 2 sites wait: `both.bc` left kernels/ at 2026-05-01 13:0"),
+        alerts[0].starts_with(
+            "input_lost: 2 sites wait: `both.bc` disappeared from kernels/ at 2026-05-01 13:0"
+        ),
         "{alerts:?}"
     );
     let waiting = |life: &Life| life.shared.read(waits).unwrap();
@@ -484,6 +485,32 @@ fn a_new_version_plans_every_site_and_runs_those_of_which_something_changed() {
     assert_eq!(life.jobs()[2].priority, Priority::Backfill);
     let why = life.ask("SELECT kind FROM cause WHERE job = 3");
     assert_eq!(why, ["tool_changed"]);
+}
+
+#[test]
+fn a_plan_without_a_change_names_another_program_only_if_there_is_one() {
+    for (prepared, expected) in [
+        (
+            "UPDATE fact SET value = 'another build' WHERE name = 'version'",
+            "tool_changed",
+        ),
+        // A site that is enabled again, or whose file has another name.
+        ("UPDATE site SET round = 0 WHERE name = 'a'", "retry_of"),
+    ] {
+        let (world, life) = two_sites("");
+        let prepare = |transaction: &rusqlite::Transaction<'_>| {
+            transaction.execute(prepared, [])?;
+            Ok(())
+        };
+        life.shared.write(prepare).unwrap();
+        life.kill();
+        std::fs::remove_file(world.path("products/a/working/a/manifest.json")).unwrap();
+        let life = Life::begin(&world);
+        life.settle();
+        life.go_on(&world, 60, 2);
+        let why = life.ask("SELECT kind FROM cause WHERE job = 3");
+        assert_eq!(why, [expected], "{prepared}");
+    }
 }
 
 #[test]

@@ -10,22 +10,21 @@ use axum::{
 
 use crate::{
     database::shown::{
-        DataStatus, Standing, Wait, count_sites, data_status, last_complete_night_ms, roots,
-        standing, totals, waits,
+        DataStatus, Standing, Totals, Wait, count_sites, data_status, last_complete_night_ms,
+        roots, standing, totals, waits,
     },
     engine::{disk::free_mib, schedule::next_night_ms, scrub::due_before_ms},
     http::{
         app::{App, blocking},
         caller::Reader,
+        groups::Group,
         metrics::Gauge,
-        pages::tone,
         problem::{Problem, ProblemDocument},
     },
+    state::JobState,
 };
 
 const OPEN_METRICS: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
-/// Groups of verdicts.
-const VERDICTS: [&str; 4] = ["valid", "remarks", "invalid", "none"];
 
 /// Metrics for Prometheus.
 #[utoipa::path(get, path = "/metrics", tag = "life", responses(
@@ -48,34 +47,10 @@ pub(super) async fn metrics(_: Reader, State(app): State<Arc<App>>) -> Result<Re
             ))
         })
         .await?;
-    let age_s =
-        |then_ms: Option<i64>| then_ms.map_or(0.0, |then_ms| (now_ms - then_ms) as f64 / 1e3);
-    let mut gauges: Vec<Gauge> = totals
-        .jobs
-        .iter()
-        .map(|(state, count)| Gauge {
-            name: "jobs",
-            help: "Jobs by state",
-            label: Some(("state", state.name())),
-            value: *count as f64,
-        })
-        .collect();
-    let unavailable = roots
-        .iter()
-        .filter(|root| root.state == "unavailable")
-        .count();
+    let mut gauges = of_jobs(&totals, now_ms);
+    let unavailable = roots.iter().filter(|root| root.state == "unavailable");
     let plain = Gauge::plain;
     gauges.extend([
-        plain(
-            "oldest_queued_job_seconds",
-            "Age of the oldest queued job, 0 without one",
-            age_s(totals.oldest_queued_ms),
-        ),
-        plain(
-            "runs_kept",
-            "Runs whose products are available",
-            totals.runs as f64,
-        ),
         plain("sites", "Sites that are enabled", sites.0 as f64),
         plain(
             "sites_stale",
@@ -85,12 +60,7 @@ pub(super) async fn metrics(_: Reader, State(app): State<Arc<App>>) -> Result<Re
         plain(
             "roots_unavailable",
             "Input folders that are not available",
-            unavailable as f64,
-        ),
-        plain(
-            "alerts_undelivered",
-            "Alerts that no hook has accepted yet",
-            totals.undelivered as f64,
+            unavailable.count() as f64,
         ),
         plain(
             "connections_open",
@@ -115,22 +85,50 @@ pub(super) async fn metrics(_: Reader, State(app): State<Arc<App>>) -> Result<Re
             value: free_mib as f64 * 1_048_576.0,
         }));
     }
-    if let Some(next_ms) = next_night_ms(&config.schedule, now_ms) {
+    let next_ms = next_night_ms(&config.schedule, now_ms);
+    gauges.extend(next_ms.map(|next_ms| {
         let help = "Start of the next night, seconds of UTC since 1970";
-        gauges.push(plain("next_night_seconds", help, next_ms as f64 / 1e3));
-    }
-    if let Some(night_ms) = night_ms {
+        plain("next_night_seconds", help, next_ms as f64 / 1e3)
+    }));
+    gauges.extend(night_ms.map(|night_ms| {
         let help = "End of the last complete night, seconds of UTC since 1970";
-        gauges.push(plain(
-            "last_complete_night_seconds",
-            help,
-            night_ms as f64 / 1e3,
-        ));
-    }
+        plain("last_complete_night_seconds", help, night_ms as f64 / 1e3)
+    }));
     let mut response = app.metrics.text(&gauges).into_response();
     let form = HeaderValue::from_static(OPEN_METRICS);
     response.headers_mut().insert(header::CONTENT_TYPE, form);
     Ok(response)
+}
+
+/// Jobs, runs and alerts.
+fn of_jobs(totals: &Totals, now_ms: i64) -> Vec<Gauge> {
+    let oldest = totals.oldest_queued_ms;
+    let age_s = oldest.map_or(0.0, |then_ms| (now_ms - then_ms) as f64 / 1e3);
+    let of_state = |(state, count): &(JobState, i64)| Gauge {
+        name: "jobs",
+        help: "Jobs by state",
+        label: Some(("state", state.name())),
+        value: *count as f64,
+    };
+    let mut gauges: Vec<Gauge> = totals.jobs.iter().map(of_state).collect();
+    gauges.extend([
+        Gauge::plain(
+            "oldest_queued_job_seconds",
+            "Age of the oldest queued job, 0 without one",
+            age_s,
+        ),
+        Gauge::plain(
+            "runs_kept",
+            "Runs whose products are available",
+            totals.runs as f64,
+        ),
+        Gauge::plain(
+            "alerts_undelivered",
+            "Alerts that no hook has accepted yet",
+            totals.undelivered as f64,
+        ),
+    ]);
+    gauges
 }
 
 /// Version, verdicts, waiting sites, kernels.
@@ -141,8 +139,9 @@ fn of_sites(standing: &Standing, waits: &[Wait]) -> Vec<Gauge> {
         label: Some(("version", env!("CARGO_PKG_VERSION"))),
         value: 1.0,
     }];
-    for group in VERDICTS {
-        let of_group = |(verdict, _): &&(Option<String>, i64)| tone(verdict.as_deref()) == group;
+    for group in Group::ALL {
+        let of_group =
+            |(verdict, _): &&(Option<String>, i64)| Group::of(verdict.as_deref()) == group;
         let count: i64 = standing
             .verdicts
             .iter()
@@ -152,7 +151,7 @@ fn of_sites(standing: &Standing, waits: &[Wait]) -> Vec<Gauge> {
         gauges.push(Gauge {
             name: "sites_by_verdict",
             help: "Enabled sites by the verdict of their current run",
-            label: Some(("verdict", group)),
+            label: Some(("verdict", group.name())),
             value: count as f64,
         });
     }

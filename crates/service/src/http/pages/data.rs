@@ -38,7 +38,10 @@ pub(super) fn last_scrub(products: &ProductStatus, times: &Times) -> Markup {
                     (counted(scrub.damaged_runs, "run")) "."
                 }
             }
-            " The next check is due for " (counted(products.runs_due, "run")) " of " (products.runs) "."
+            @match products.runs_due {
+                0 => " No run is due for the next check.",
+                due => { " The next check is due for " (due) " of " (counted(products.runs, "run")) "." }
+            }
         }
     }
 }

@@ -26,7 +26,7 @@ pub(super) async fn docs(
     let body = html! {
         p { (prose(text(&description["info"]["description"]))) }
         p {
-            "The same as a document for programs: " a href="/openapi.json" { "openapi.json" } " (OpenAPI "
+            "The same description for programs: " a href="/openapi.json" { "openapi.json" } " (OpenAPI "
             (text(&description["openapi"])) "). A token is sent as " code { "Authorization: Bearer areo_…" }
             "; " code { "areograph service token add" } " creates one."
         }
@@ -114,7 +114,7 @@ fn document(name: &str, schema: &Value) -> Markup {
                 p { "One of " @for (k, word) in items(&schema["enum"]).enumerate() { @if k > 0 { ", " } code { (text(word)) } } "." }
             }
             @if parts.iter().any(|part| part.get("properties").is_some()) {
-                (table("Entries", &["Name", "Type", "Always there", "Meaning"], &html! {
+                (table("Entries", &["Name", "Type", "Required", "Meaning"], &html! {
                     @for part in &parts {
                         @for (entry, property) in entries(&part["properties"]) {
                             tr {

@@ -20,6 +20,7 @@ use crate::{
         problem::Problem,
     },
     instant::Instant,
+    words::counted,
 };
 
 /// Events on one page.
@@ -40,7 +41,7 @@ const KINDS: [(&str, &str); 9] = [
 /// A filter of events.
 #[derive(Debug, Deserialize)]
 pub(super) struct EventsWanted {
-    after: Option<i64>,
+    before: Option<i64>,
     kind: Option<String>,
     site: Option<String>,
 }
@@ -55,25 +56,28 @@ pub(super) async fn list(
     if let Some(site) = &site {
         name(site)?;
     }
+    let kind = wanted.kind.filter(|kind| !kind.is_empty());
     let is_known = |kind: &String| KINDS.iter().any(|(known, _)| known == kind);
-    let kind = wanted.kind.filter(is_known);
+    if kind.as_ref().is_some_and(|kind| !is_known(kind)) {
+        return Err(Problem::bad_request("kind is not a kind of event."));
+    }
     let (of_kind, of_site) = (kind.clone(), site.clone());
     let found = app
         .read(move |connection| {
             let filter = EventFilter {
                 kind: of_kind.as_deref(),
                 site: of_site.as_deref(),
-                before: wanted.after,
+                before: wanted.before,
             };
             events_before(connection, &filter, EVENTS + 1)
         })
         .await?;
     let shown = &found[..found.len().min(EVENTS as usize)];
-    let address = |kind: Option<&str>, after: Option<i64>| {
+    let address = |kind: Option<&str>, before: Option<i64>| {
         let mut parts = Vec::new();
         parts.extend(kind.map(|kind| format!("kind={kind}")));
         parts.extend(site.as_ref().map(|site| format!("site={site}")));
-        parts.extend(after.map(|after| format!("after={after}")));
+        parts.extend(before.map(|before| format!("before={before}")));
         format!("/events?{}", parts.join("&"))
     };
     let next = shown.last().filter(|_| found.len() > shown.len());
@@ -150,15 +154,17 @@ fn event_text(kind: &str, data: &Value) -> String {
             text(&data["text"]),
         ),
         "night" if data["sites_checked"].is_number() => format!(
-            "complete: {} sites checked, {} runs, {} failures",
-            data["sites_checked"], data["runs"], data["failures"]
+            "complete: {} checked, {}, {}",
+            counted(&data["sites_checked"], "site"),
+            counted(&data["runs"], "run"),
+            counted(&data["failures"], "failure")
         ),
         "night" => "begins".to_owned(),
         "alert" => with(text(&data["alert"]).replace('_', " "), text(&data["text"])),
         "config" if data["taken"] == true => "the configuration is in force".to_owned(),
         "fetch" => {
             let failures = data["failures"].as_array().map_or(0, Vec::len);
-            format!("archive files retrieved, {failures} failures")
+            format!("archive files retrieved, {}", counted(failures, "failure"))
         }
         _ => text(&data["text"]),
     }
@@ -193,6 +199,16 @@ mod tests {
                 "input lost: 2 sites wait",
             ),
             ("run", json!({ "verdict": "valid" }), "valid"),
+            (
+                "night",
+                json!({ "sites_checked": 4, "runs": 1, "failures": 0 }),
+                "complete: 4 sites checked, 1 run, 0 failures",
+            ),
+            (
+                "fetch",
+                json!({ "sites": 1, "failures": ["indexes"] }),
+                "archive files retrieved, 1 failure",
+            ),
             (
                 "file",
                 json!({ "text": "`a` has new content" }),

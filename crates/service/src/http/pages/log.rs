@@ -27,7 +27,8 @@ struct Row {
     stage: Option<String>,
     seconds: Option<f64>,
     text: String,
-    is_fault: bool,
+    /// `warning` or `error`.
+    level: Option<&'static str>,
     /// Whether it is a stage that has not ended yet.
     runs: bool,
 }
@@ -82,7 +83,11 @@ fn row(line: Line) -> Row {
         stage: line.stage,
         seconds: line.seconds,
         text,
-        is_fault: matches!(&*line.level, "WARN" | "ERROR"),
+        level: match &*line.level {
+            "WARN" => Some("warning"),
+            "ERROR" => Some("error"),
+            _ => None,
+        },
     }
 }
 
@@ -99,7 +104,7 @@ pub(super) fn log_table(text: &str, from_start: bool, ended: bool) -> Markup {
                         td class="number" {
                             @match row.seconds { Some(seconds) => (format!("{seconds:.2}")), None if row.runs && !ended => "runs", None => "–" }
                         }
-                        td class="long lines" { @if row.is_fault { span class="word remarks" { "warning " } } (row.text) }
+                        td class="long lines" { @if let Some(level) = row.level { span class=(if level == "error" { "word invalid" } else { "word remarks" }) { (level) " " } } (row.text) }
                     }
                 }
             }))
@@ -120,20 +125,23 @@ mod tests {
             r#"{"timestamp":"2026-03-01T01:00:02.5Z","level":"INFO","message":"done","stage":"register/E02-00665","seconds":2.4}"#,
             "\n",
             r#"{"timestamp":"2026-03-01T01:00:03Z","level":"WARN","message":"first\nsecond"}"#,
+            "\n",
+            r#"{"timestamp":"2026-03-01T01:00:04Z","level":"ERROR","message":"lost"}"#,
             "\nthread panicked\n  at line 1\n{\"cut_bytes\":70}\n",
         );
         let rows = rows(text, false);
-        let found: Vec<(&str, Option<f64>, bool)> = rows
+        let found: Vec<(&str, Option<f64>, Option<&str>)> = rows
             .iter()
-            .map(|row| (&*row.text, row.seconds, row.is_fault))
+            .map(|row| (&*row.text, row.seconds, row.level))
             .collect();
         assert_eq!(
             found,
             [
-                ("no earlier output", Some(2.4), false),
-                ("first\nsecond", None, true),
-                ("thread panicked\n  at line 1", None, false),
-                ("70 bytes of the log were not kept", None, false),
+                ("no earlier output", Some(2.4), None),
+                ("first\nsecond", None, Some("warning")),
+                ("lost", None, Some("error")),
+                ("thread panicked\n  at line 1", None, None),
+                ("70 bytes of the log were not kept", None, None),
             ]
         );
         assert_eq!(

@@ -26,7 +26,6 @@ use axum::{
 };
 
 use super::app::App;
-pub(super) use parts::tone;
 
 /// A file of this version never changes.
 const KEPT: (HeaderName, &str) = (header::CACHE_CONTROL, "public, max-age=31536000, immutable");

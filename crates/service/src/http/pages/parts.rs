@@ -5,7 +5,12 @@ use chrono_tz::Tz;
 use maud::{Markup, PreEscaped, html};
 use serde_json::Value;
 
-use crate::{clock::utc_text, http::app::App, instant::Instant, state::JobState};
+use crate::{
+    clock::utc_text,
+    http::{app::App, groups::Group},
+    instant::Instant,
+    state::JobState,
+};
 
 const MINUTE_MS: i64 = 60_000;
 const HOUR_MS: i64 = 60 * MINUTE_MS;
@@ -63,12 +68,12 @@ impl Times {
 }
 
 /// CSS class of a verdict's colour.
-pub(in crate::http) fn tone(verdict: Option<&str>) -> &'static str {
-    match verdict {
-        Some("valid") => "valid",
-        Some(verdict) if verdict.starts_with("valid") => "remarks",
-        Some(_) => "invalid",
-        None => "none",
+pub(super) fn tone(verdict: Option<&str>) -> &'static str {
+    match Group::of(verdict) {
+        Group::Valid => "valid",
+        Group::Remarks => "remarks",
+        Group::Invalid => "invalid",
+        Group::NoRun => "none",
     }
 }
 

@@ -139,7 +139,7 @@ fn site_table(sites: &[Site], times: &Times) -> Markup {
             @for site in sites {
                 tr {
                     th scope="row" { a href={ "/sites/" (site.name) } { (site.name) } }
-                    td { (verdict(site.verdict.as_deref())) @if site.newest_valid == Some(false) { " " small { "newest run not valid" } } }
+                    td { (verdict(site.verdict.as_deref())) @if site.newest_valid == Some(false) { " " small { "newest run invalid" } } }
                     td { (times.maybe(site.current_since_utc)) }
                     td { @match site.checked_utc { Some(at) => (times.age(at)), None => "never" } }
                     td class="long" { (brief(site, times)) }
@@ -155,7 +155,7 @@ fn brief(site: &Site, times: &Times) -> Markup {
     html! {
         @match (&site.waits_for, &site.problem) {
             (Some(what), _) if site.enabled => { span class="word remarks" { "waits" } " for " code { (what) } }
-            (None, Some(_)) if site.enabled => { span class="word invalid" { "not run" } ", see above" }
+            (None, Some(_)) if site.enabled => { span class="word invalid" { "not run" } "; see above" }
             _ => (freshness(site, times)),
         }
     }
@@ -276,7 +276,7 @@ fn site_lead(site: &Site, newest: Option<&Run>, times: &Times) -> Markup {
                 }
             }
             @if let Some(run) = newest.filter(|run| !run.valid) {
-                p { "The newest run, " a href={ "/runs/" (run.id) } { (run.id) } ", is not valid and did not become current:" }
+                p { "The newest run, " a href={ "/runs/" (run.id) } { (run.id) } ", is invalid and did not become current:" }
                 (said(&super::parts::sentences(&run.reasons)))
             }
             p { "Inputs last compared: " (times.maybe(site.checked_utc)) "." }

@@ -61,6 +61,8 @@ pub(super) fn standing(sites: &[Site], faults: &Faults<'_>, times: &Times) -> Ma
     let wrong = refused(sites);
     let invalid = |site: &&Site| site.newest_valid == Some(false);
     let invalid = sites.iter().filter(invalid).count();
+    let without_run = |site: &&Site| site.enabled && site.verdict.is_none();
+    let without_run = sites.iter().filter(without_run).count();
     let problem = faults.configuration.as_deref();
     let worst = if !away.is_empty()
         || !faults.waits.is_empty()
@@ -72,20 +74,20 @@ pub(super) fn standing(sites: &[Site], faults: &Faults<'_>, times: &Times) -> Ma
         || faults.data.products.runs_damaged > 0
     {
         "invalid"
-    } else if stale > 0 || count("none") > 0 {
+    } else if stale > 0 || without_run > 0 {
         "remarks"
     } else {
         "valid"
     };
-    let headline = match (sites.len(), stale, waiting) {
-        (0, ..) => "No sites yet: put site files into the site folder".to_owned(),
-        (all, 0, _) => format!("{}, all of them up to date", counted(all, "site")),
-        (all, stale, 0) => format!("{}, {stale} of them stale", counted(all, "site")),
-        (all, stale, waiting) => format!(
-            "{}: {stale} stale, {waiting} of them waiting for an input",
-            counted(all, "site")
-        ),
-    };
+    let refused: usize = wrong.iter().map(|one| one.sites.len()).sum();
+    let parts = [
+        (stale, "stale"),
+        (waiting, "waiting for an input"),
+        (refused, "not run because of a failure"),
+        (invalid, "with an invalid newest run"),
+        (without_run, "without a run"),
+    ];
+    let headline = headline(sites.len(), &parts, worst);
     lead(
         worst,
         &headline,
@@ -101,12 +103,26 @@ pub(super) fn standing(sites: &[Site], faults: &Faults<'_>, times: &Times) -> Ma
                     @for (k, site) in one.sites.iter().enumerate() { @if k > 0 { ", " } a href={ "/sites/" (site) } { (site) } }
                     ": " (prose(one.problem))
                 } }
-                @if invalid > 0 { li { "The newest run of " (counted(invalid, "site")) " is not valid; earlier products stay current." } }
-                @if count("remarks") > 0 { li { (count("remarks")) " valid with remarks." } }
-                @if count("none") > 0 { li { (count("none")) " without a run." } }
+                @if invalid > 0 { li { "The newest run of " (counted(invalid, "site")) " is invalid; earlier products remain current." } }
+                @if worst != "invalid" && count("remarks") > 0 { li { (counted(count("remarks"), "site")) " valid with remarks." } }
             }
         },
     )
+}
+
+/// All sites, and how many of them are not as they should be.
+fn headline(sites: usize, parts: &[(usize, &str)], worst: &str) -> String {
+    let parts = parts.iter().filter(|(sites, _)| *sites > 0);
+    let parts: Vec<String> = parts
+        .map(|(sites, what)| format!("{sites} {what}"))
+        .collect();
+    let all = counted(sites, "site");
+    match (sites, parts.is_empty()) {
+        (0, _) => "No sites yet: put site files into the site folder".to_owned(),
+        (_, true) if worst == "invalid" => all,
+        (_, true) => format!("{all}, all of them up to date"),
+        (_, false) => format!("{all}: {}", parts.join(", ")),
+    }
 }
 
 /// A lost or unusable file, the sites that wait for it, and the age of their products.
@@ -128,8 +144,8 @@ fn cause(wait: &Wait, sites: &[Site]) -> Markup {
         @for (k, site) in wait.sites.iter().enumerate() { @if k > 0 { ", " } a href={ "/sites/" (site) } { (site) } }
         "."
         @match (first, last) {
-            (Some(first), Some(last)) if first != last => { " The products stay those of " (first) " to " (last) "." }
-            (Some(first), _) => { " The products stay those of " (first) "." }
+            (Some(first), Some(last)) if first != last => { " The products of " (first) " to " (last) " remain current." }
+            (Some(first), _) => { " The products of " (first) " remain current." }
             _ => {}
         }
     }

@@ -180,7 +180,7 @@ fn plot(name: &str, runs: &[&Run], values: &[Option<f64>], steps: &[Option<Strin
                         circle cx=(format!("{across:.1}")) cy=(format!("{down:.1}")) r="3.5" fill="#0E5A99" { title { (run.id) ": " (figure(*value)) } }
                     } @else {
                         path d=(format!("M{:.1} {:.1}l10 10m0 -10l-10 10", across - 5.0, down - 5.0)) stroke="#C10019" stroke-width="2.5" {
-                            title { (run.id) ": " (figure(*value)) ", not valid" }
+                            title { (run.id) ": " (figure(*value)) ", invalid" }
                         }
                     }
                 }
@@ -190,7 +190,7 @@ fn plot(name: &str, runs: &[&Run], values: &[Option<f64>], steps: &[Option<Strin
             figcaption {
                 "From " (figure(*first)) " to " (figure(*last)) " over " (counted(points.len(), "run")) "."
                 @if steps.iter().any(Option::is_some) { " Broken lines: kernels changed." }
-                @if runs.iter().any(|run| !run.valid) { " Crosses: not valid." }
+                @if runs.iter().any(|run| !run.valid) { " Crosses: invalid." }
             }
         }
     }
