@@ -91,7 +91,7 @@ impl Document for ServiceConfig {
 
 declare_table! {
     /// Input folders. Site files may refer only to files below these folders. A folder must exist when the service
-    /// first reads it; if it is temporarily absent later, the sites that use it are suspended.
+    /// first reads it; if it is temporarily absent later, the sites that use it wait.
     pub struct ServiceInputs {
         /// Folders of site files (`*.toml`, without subfolders). The next poll detects new and changed files.
         sites: Vec<PathBuf> = key(list(MIRROR).each_once("each folder once")).required().example(r#"["sites"]"#),
@@ -144,7 +144,7 @@ declare_table! {
         /// Time without changes in a folder after which the folder is used: mirrors copy slowly.
         quiet_period_s: f64 = key(from_to(0.0, 86_400.0)).or(600.0),
         /// Largest share of files that may disappear from a folder; above this limit, the folder is treated as
-        /// unavailable, and the sites that use it are suspended.
+        /// unavailable, and the sites that use it wait.
         max_loss: f64 = key(from_to(0.0, 1.0)).or(0.2),
         /// Longest time for listing a folder; an unavailable mount does not respond.
         sweep_limit_s: f64 = key(from_to(0.1, 3600.0)).or(30.0),
