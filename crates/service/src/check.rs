@@ -11,7 +11,7 @@ use rustix::fs::{Access, access};
 
 use super::{
     clock::minute_text,
-    database::{Layout, look_at},
+    database::{Layout, Seen, look_at},
     engine::{
         disk::free_mib,
         folders::{Folder, folders},
@@ -19,7 +19,7 @@ use super::{
         schedule::next_night_ms,
     },
     lock::{LOCK, Owner, refuse_network},
-    recover::refuse_foreign,
+    recover::{refuse_foreign, require_products},
     start::never_seen,
     words::counted,
 };
@@ -72,8 +72,9 @@ pub fn check(config: &ServiceConfig, now_ms: i64) -> Vec<Finding> {
     note("schedule", &config.schedule.cron, true, Ok(next));
     let (state, products) = (&config.outputs.state, &config.outputs.products);
     note("state", &state.display(), true, state_folder(state));
-    note("products", &products.display(), true, writable(products));
     let database = look_at(state);
+    let folder = products_folder(database.as_ref().ok().and_then(Option::as_ref), products);
+    note("products", &products.display(), true, folder);
     let known = match &database {
         Ok(Some(seen)) => seen.roots.clone(),
         _ => Vec::new(),
@@ -167,6 +168,12 @@ fn state_folder(state: &Path) -> Result<String> {
 fn above(folder: &Path) -> PathBuf {
     let existing = folder.ancestors().find(|above| above.exists());
     existing.unwrap_or(Path::new("/")).to_owned()
+}
+
+/// The folder of the products beside an existing database.
+fn products_folder(database: Option<&Seen>, products: &Path) -> Result<String> {
+    require_products(database.map_or(0, |seen| seen.runs), products)?;
+    writable(products)
 }
 
 fn writable(folder: &Path) -> Result<String> {

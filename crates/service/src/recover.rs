@@ -52,6 +52,15 @@ pub fn examine(database: &Database, products: &Path) -> Result<()> {
     mark(products, &id, is_used)
 }
 
+/// Refuses a folder of products without the mark of a service and without a run, where the database records `runs`: the
+/// disk of the products may not be mounted, and a service would make them again below the mount point.
+pub(crate) fn require_products(runs: i64, products: &Path) -> Result<()> {
+    if runs > 0 && owner(products)?.is_none() && !has_runs(products)? {
+        return Err(DatabaseError::NoProducts(runs)).in_file(products);
+    }
+    Ok(())
+}
+
 /// Refuses a database of which the identity is not that of the products.
 pub(crate) fn refuse_foreign(known: Option<&str>, products: &Path) -> Result<()> {
     match (known, owner(products)?) {

@@ -12,13 +12,13 @@ use serde_json::json;
 
 use super::{
     clock::Clock,
-    database::{About, Database, Stored, append, files::roots, service::put_service},
+    database::{About, Database, Stored, append, files::roots, runs::count, service::put_service},
     engine::{
         folders::{Folder, folders},
         schedule::Schedule,
     },
     lock::{Owner, ServiceLock},
-    recover::{examine, is_lost},
+    recover::{examine, is_lost, require_products},
     shared::Shared,
     worker::process::ProcessIdentity,
 };
@@ -106,10 +106,12 @@ pub fn start(config: ServiceConfig, command: &str, clock: Clock) -> Result<Start
     };
     let lock = ServiceLock::take(&state, &owner)?;
     let products = &config.outputs.products;
+    let database = Database::open(&state)?;
+    let runs = database.read(count).in_file(&state)?;
+    require_products(runs, products)?;
     std::fs::create_dir_all(products)
         .map_err(IoError::on("create the folder"))
         .in_file(products)?;
-    let database = Database::open(&state)?;
     examine(&database, products)?;
     let lost = database.read(is_lost).in_file(&state)?;
     database

@@ -80,6 +80,10 @@ pub enum DatabaseError {
     #[cause(Input: "restore the newest copy from the folder `copies`, or rebuild the database from the products with \
         `areograph service rebuild`")]
     Damaged(String),
+    /// The disk of the products is absent.
+    #[error("the database records {0} runs, but the folder of the products contains none of them")]
+    #[cause(Input: "mount the disk of the products, or restore them; to start without them, run `areograph service rebuild`")]
+    NoProducts(i64),
     /// A newer areograph wrote it.
     #[error("the database has layout {found}; this areograph supports layouts up to {VERSION}")]
     #[cause(Input: "start the newer areograph, or restore a copy of the database with an earlier layout")]
@@ -255,6 +259,8 @@ pub struct Seen {
     pub identity: Option<String>,
     /// Paths of the known folders of inputs.
     pub roots: Vec<String>,
+    /// Number of recorded runs.
+    pub runs: i64,
 }
 
 /// Looks at the database in `folder` and changes nothing; `None` without a database.
@@ -283,6 +289,7 @@ pub fn look_at(folder: &Path) -> Result<Option<Seen>> {
             layout,
             identity,
             roots: known.into_iter().map(|root| root.path).collect(),
+            runs: runs::count(&connection)?,
         }))
     };
     look().in_file(&path)

@@ -290,3 +290,11 @@ pub(super) fn run_row(row: &Row<'_>) -> rusqlite::Result<Run> {
         damaged: row.get("damaged")?,
     })
 }
+
+/// Number of runs.
+///
+/// # Errors
+/// SQLite errors.
+pub fn count(connection: &Connection) -> Stored<i64> {
+    Ok(connection.query_row("SELECT count(*) FROM run", [], |row| row.get(0))?)
+}

@@ -276,11 +276,19 @@ fn products_that_are_not_there_are_not_damaged() {
     life.go_on(&world, 8 * DAY_S, 1);
     let damaged = "SELECT id FROM run WHERE damaged > 0";
     assert_eq!(life.ask(damaged), [""; 0]);
-    // A start with an empty folder does not mark it as that of the service.
+    // A service does not start beside an empty folder, and does not create one.
     life.kill();
+    let refused = Life::start(&world).err().unwrap().to_string();
+    assert!(
+        refused
+            .contains("the database records 2 runs, but the folder of the products contains none"),
+        "{refused}"
+    );
     fs::remove_dir_all(world.path("products")).unwrap();
+    assert!(Life::start(&world).is_err());
+    assert!(!world.path("products").exists());
+    fs::rename(world.path("away"), world.path("products")).unwrap();
     let life = Life::start(&world).unwrap();
-    assert!(!world.path("products/.areograph-service").exists());
     life.go_on(&world, 8 * DAY_S, 1);
     assert_eq!(life.ask(damaged), [""; 0]);
     assert!(!alerts(&life).contains(&"product_damaged".to_owned()));
