@@ -220,7 +220,7 @@ fn what_is_no_kernel_is_refused_with_its_name() {
         transfer.contains("is a transfer file (convert it"),
         "{transfer}"
     );
-    assert_eq!(one(&at.join("absent.bsp")).kind(), Kind::Io);
+    assert_eq!(one(&at.join("absent.bsp")).kind(), Kind::Input);
     assert_eq!(one(at).kind(), Kind::Input);
     let deep = at.join("d".repeat(200)).join("e".repeat(200));
     let failure = one(&deep.join("naif.tls")).to_string();
