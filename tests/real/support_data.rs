@@ -548,7 +548,7 @@ fn what_is_wrong_with_real_support_data_is_said() {
         // The pixel pitch stands where coefficients should; ALE would write the same again.
         (
             "ale_mgs/isds/mgsmocna_isd.json",
-            "what to do: configure the image by label and kernels. ALE always writes",
+            "what to do: configure the image by label and kernels. For MOC, ALE repeats",
         ),
         (
             "ale_mex/isds/mexsrc_isd.json",
