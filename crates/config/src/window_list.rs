@@ -67,7 +67,7 @@ enum WindowError {
 /// The windows in the file `path`.
 ///
 /// # Errors
-/// [`Problems`](super::Problems) with everything that is wrong, or [`IoError`](areograph_base::error::IoError).
+/// [`Problems`](super::Problems) with everything that is wrong, or [`IoError`].
 pub fn load_windows(path: &Path) -> Result<Vec<WindowConfig>, Error> {
     let text = read(path)?;
     let mut review = Review::new(path, &text);
