@@ -7,9 +7,7 @@ use clap::Args;
 use super::{load_sites, output, progress::Progress};
 use crate::{
     error::{Error, Kind},
-    flow::{
-        Checked, Extent, FoundProducts, PUBLISH, RunOptions, check_answer, check_out, check_site,
-    },
+    flow::{Checked, Extent, FoundProducts, RunOptions, check_answer, check_out, check_site},
     store::hashes::HashCache,
 };
 
@@ -56,13 +54,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     for site in load_sites(&arguments.sites)? {
         let progress = Progress::of_work(&site.site);
         let options = RunOptions {
-            out: arguments.out.clone(),
-            until: PUBLISH,
-            force: false,
-            stop: &never,
-            hashes: &hashes,
-            roots: &[],
             observer: &progress,
+            ..RunOptions::of(&arguments.out, &never, &hashes)
         };
         let mut checked = check_site(&site, extent, &options);
         drop(progress);

@@ -53,6 +53,7 @@ pub(super) const TIES: FileKind = FileKind {
     endings: TIE_ENDINGS,
     below: true,
 };
+
 /// Reasons why a path stands for no file.
 #[derive(Debug, thiserror::Error, Cause)]
 enum NoFiles {
@@ -89,6 +90,8 @@ pub(super) fn expand(paths: &[PathBuf], kind: &FileKind) -> Result<Vec<PathBuf>>
     Ok(files)
 }
 
+/// Makes sure that every path leads to a file or folder.
+///
 /// # Errors
 /// A path that leads nowhere.
 pub(super) fn exist(paths: &[PathBuf]) -> Result<()> {

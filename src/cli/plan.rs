@@ -13,7 +13,7 @@ use super::{files, load, load_sites, output};
 use crate::{
     config::{CalibrationConfig, NetConfig},
     error::Error,
-    flow::{PUBLISH, RunOptions, StageReason, Task, check_out, plan_answer, plan_task},
+    flow::{RunOptions, StageReason, Task, check_out, plan_answer, plan_task},
     stage::Reason,
     store::hashes::HashCache,
 };
@@ -80,15 +80,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     let files = Files::of(&files::expand(&arguments.files, &files::CONFIGURATIONS)?)?;
     let sites = load_sites(&files.sites)?;
     check_out(&arguments.out, &sites)?;
-    let options = RunOptions {
-        out: arguments.out.clone(),
-        until: PUBLISH,
-        force: false,
-        stop: &AtomicBool::new(false),
-        hashes: &HashCache::in_folder(&arguments.out, arguments.rehash),
-        roots: &[],
-        observer: &(),
-    };
+    let (never, hashes) = (
+        AtomicBool::new(false),
+        HashCache::in_folder(&arguments.out, arguments.rehash),
+    );
+    let options = RunOptions::of(&arguments.out, &never, &hashes);
     let tasks = sites.iter().map(Task::Site);
     let tasks = tasks.chain(files.nets.iter().map(Task::Net));
     let tasks = tasks.chain(files.calibrations.iter().map(Task::Calibration));

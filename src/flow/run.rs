@@ -52,7 +52,21 @@ pub struct RunOptions<'a> {
     pub observer: &'a dyn Observer,
 }
 
-impl RunOptions<'_> {
+impl<'a> RunOptions<'a> {
+    /// A run to the products, with stored outputs, input files anywhere, and no observer.
+    #[must_use]
+    pub fn of(out: &Path, stop: &'a AtomicBool, hashes: &'a HashCache) -> Self {
+        Self {
+            out: out.to_owned(),
+            until: PUBLISH,
+            force: false,
+            stop,
+            hashes,
+            roots: &[],
+            observer: &(),
+        }
+    }
+
     /// The input files of a run.
     pub(super) fn files(&self) -> InputFiles {
         self.hashes.files().within(self.roots)

@@ -73,6 +73,34 @@ fn a_plan_of_a_net_and_of_a_calibration_says_what_a_run_does() {
 }
 
 #[test]
+fn commands_of_sites_name_a_net_as_such() {
+    let case = written();
+    succeed(case.areograph().args(["--quiet", "triangulate", NET]));
+    succeed(
+        std::process::Command::new("cp")
+            .args(["-r", "out", "before"])
+            .current_dir(case.path("")),
+    );
+    for command in ["check", "run"] {
+        let refused = told(&case, &[command, NET]);
+        assert!(refused.starts_with("exit 2\n"), "{refused}");
+        assert!(
+            refused.contains("describes a net; expected a site"),
+            "{refused}"
+        );
+    }
+    let both = [
+        ["before", "out"],
+        ["before/synthetic_net", "out/synthetic_net"],
+    ];
+    for [before, after] in both {
+        let refused = told(&case, &["report", "diff", before, after]);
+        assert!(refused.starts_with("exit 2\n"), "{refused}");
+        assert!(refused.contains("those of another flow"), "{refused}");
+    }
+}
+
+#[test]
 fn a_flow_stops_after_the_stage_that_is_named() {
     let case = written();
     let stopped = told(&case, &["triangulate", NET, "--until", "triangulate"]);

@@ -272,6 +272,22 @@ fn what_cannot_be_asked_is_refused_with_a_way_out() {
     assert!(refused(&[BOX, "--time", "5..1"]).contains("not a time interval"));
     assert!(refused(&[BOX, "--out", "found.xyz"]).contains("--format"));
     assert!(refused(&[BOX, "--format", "csv"]).contains("--out"));
+    // The same box by the coordinates of older maps.
+    let rows = |arguments: &[&str]| {
+        let found = areograph(&[&["search", text(&archive)], arguments].concat());
+        json(&found)["rows"].as_u64().unwrap()
+    };
+    let east = rows(&["--box=181,359,-60,60"]);
+    assert!(east > 0);
+    assert_eq!(rows(&["--box=179,1,-60,60", "--longitude", "west"]), east);
+    assert_eq!(rows(&["--box=-179,-1,-60,60"]), east);
+    let areographic = rows(&["--box=181,359,-60,60", "--latitude", "areographic"]);
+    assert!(
+        0 < areographic && areographic < east,
+        "{areographic} {east}"
+    );
+    let alone = refused(&["--windows", "many.toml", "--longitude", "west"]);
+    assert!(alone.contains("--box"), "{alone}");
     let empty = folder.path().join("empty");
     fs::create_dir(&empty).unwrap();
     let output = areograph(&["search", text(&empty), BOX]);

@@ -294,6 +294,41 @@ fn pedr_files_of_one_name_are_of_distinct_images() {
     assert_eq!(plan(&case)["search_footprints"], "pedr ap19117l.b changed");
 }
 
+/// The verdict of a check is that of products only while a run would keep them.
+#[test]
+fn a_check_states_the_verdict_of_current_products_alone() {
+    let case = Case::new();
+    let checked = |further: &[&str]| {
+        let mut command = case.areograph();
+        command.args(["--quiet", "check", "site.toml", "--out", "out"]);
+        command.args(further);
+        case.outcome(command)
+    };
+    let current = "products are up to date; verdict: valid\n";
+    let absent = checked(&[]);
+    assert!(
+        absent.ends_with("  verdict: not computed; --full computes it, as a run does\n"),
+        "{absent}"
+    );
+    assert!(checked(&["--full"]).ends_with("  a run would be valid\n"));
+    assert!(!case.path("out").exists());
+    run(&case);
+    assert!(checked(&[]).contains(current) && checked(&["--full"]).contains(current));
+    // A product that was changed, and a key.
+    let product = case.read("out/case/profiles.json");
+    case.write("out/case/profiles.json", [&product[..], b"\n"].concat());
+    let stale = "products are out of date (areograph plan states why); verdict: not computed";
+    assert!(checked(&[]).contains(stale), "{}", checked(&[]));
+    run(&case);
+    assert!(checked(&[]).contains(current));
+    case.replace(
+        "site.toml",
+        "site = \"case\"",
+        "site = \"case\"\ndescription = \"new\"",
+    );
+    assert!(checked(&[]).contains(stale), "{}", checked(&[]));
+}
+
 #[test]
 fn until_force_and_plan() {
     let case = Case::new();

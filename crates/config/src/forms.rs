@@ -251,7 +251,8 @@ pub(super) fn identifier() -> Matching {
 
 /// The form of the identifier of a site.
 pub const SITE_IDENTIFIER: &str =
-    "1 to 64 lower-case letters, digits, `_` or `-`, beginning with a letter or digit"; // IDENTIFIER_MAX
+    "1 to 64 lower-case letters, digits, `_` or `-`, beginning with a letter or digit";
+const _: () = assert!(IDENTIFIER_MAX == 64, "as stated in SITE_IDENTIFIER");
 
 /// Whether a text may be the identifier of a site.
 #[must_use]

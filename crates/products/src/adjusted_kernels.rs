@@ -136,7 +136,7 @@ const fn kernel(
 }
 
 /// Readers of the pair with the convention of the run.
-const RUN: &str = "areograph, SPICE (not ISIS, ALE)";
+const RUN: &str = "areograph, SPICE; ISIS and ALE only in a run with light time to the centre";
 /// Readers of the pair with light time to the centre.
 const CENTRE: &str = "ISIS, ALE";
 
@@ -173,7 +173,7 @@ pub(super) static CENTRE_POSITION: Declaration = kernel(
 pub(super) static METAKERNEL: Declaration = Declaration {
     path: "adjusted.tm",
     what: "metakernel of the site kernels, followed by the adjusted kernels",
-    readers: "SPICE",
+    readers: RUN,
     rows: "",
     role: Role::Metadata,
     content: Content::Foreign,

@@ -3,15 +3,14 @@
 use std::{
     path::{Path, PathBuf},
     process::ExitCode,
-    sync::atomic::AtomicBool,
 };
 
 use areograph::{
     config::{Document as _, SiteConfig, built_in_instruments},
     error::Result,
     flow::{
-        Extent, PUBLISH, RunOptions, Task, check_answer, check_out, check_site, plan_answer,
-        plan_site, publish_sites, run_answer, run_site,
+        Extent, RunOptions, Task, check_answer, check_out, check_site, plan_answer, plan_site,
+        publish_sites, run_answer, run_site,
     },
     pds::read_label,
     service::start::set_program,
@@ -47,23 +46,6 @@ fn load(site: &Path) -> Result<(SiteConfig, Vec<String>)> {
     Ok((loaded.config, warnings))
 }
 
-fn options<'a>(
-    out: &Path,
-    force: bool,
-    stop: &'a AtomicBool,
-    hashes: &'a HashCache,
-) -> RunOptions<'a> {
-    RunOptions {
-        out: out.to_owned(),
-        until: PUBLISH,
-        force,
-        stop,
-        hashes,
-        roots: &[],
-        observer: &(),
-    }
-}
-
 /// A JSON answer, and warnings on the configuration.
 type Answered = (String, Vec<String>);
 
@@ -74,7 +56,11 @@ pub(crate) fn run(py: Python<'_>, site: PathBuf, out: PathBuf, force: bool) -> P
         let (config, warnings) = load(&site)?;
         check_out(&out, std::slice::from_ref(&config))?;
         let hashes = HashCache::in_folder(&out, false);
-        let outcome = run_site(&config, &options(&out, force, stop, &hashes))?;
+        let options = RunOptions {
+            force,
+            ..RunOptions::of(&out, stop, &hashes)
+        };
+        let outcome = run_site(&config, &options)?;
         publish_sites(&out)?;
         Ok((run_answer(&outcome).to_string(), warnings))
     })
@@ -87,7 +73,7 @@ pub(crate) fn plan(py: Python<'_>, site: PathBuf, out: PathBuf) -> PyResult<Answ
         let (config, warnings) = load(&site)?;
         check_out(&out, std::slice::from_ref(&config))?;
         let hashes = HashCache::in_folder(&out, false);
-        let plan = plan_site(&config, &options(&out, false, stop, &hashes))?;
+        let plan = plan_site(&config, &RunOptions::of(&out, stop, &hashes))?;
         Ok((
             plan_answer(Task::Site(&config), &plan).to_string(),
             warnings,
@@ -102,7 +88,7 @@ pub(crate) fn check(py: Python<'_>, site: PathBuf, out: PathBuf, full: bool) -> 
         let (config, warnings) = load(&site)?;
         let hashes = HashCache::in_folder(&out, false);
         let extent = if full { Extent::Full } else { Extent::Inputs };
-        let mut checked = check_site(&config, extent, &options(&out, false, stop, &hashes));
+        let mut checked = check_site(&config, extent, &RunOptions::of(&out, stop, &hashes));
         let apart = check_out(&out, std::slice::from_ref(&config));
         checked.failures.splice(0..0, apart.err());
         Ok((check_answer(&config.site, &checked).to_string(), warnings))

@@ -10,7 +10,9 @@ pub(super) enum DifferenceError {
     #[cause(Input: "name the folder given to --out, or a site folder in it")]
     NoProducts,
     /// Products of another flow.
-    #[error("the products are those of a net, a calibration or a match; expected those of a site")]
+    #[error(
+        "the products are those of another flow (net, calibration, match or archive); expected those of a site"
+    )]
     #[cause("name the products of a site: the comparison is defined for sites only")]
     NoSite,
     /// Two names of one folder.

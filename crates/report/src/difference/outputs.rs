@@ -72,6 +72,11 @@ fn common(a: &Path, b: &Path) -> Result<Pairs> {
         });
     }
     no_sites.sort();
+    for (folder, found) in [(a, &first), (b, &second)] {
+        if found.is_empty() {
+            return Err(DifferenceError::NoSite).in_file(folder);
+        }
+    }
     let names = |sites: &BTreeMap<String, PathBuf>| sites.keys().cloned().collect::<Vec<_>>();
     let (names_a, names_b) = (names(&first), names(&second));
     let mut both = Vec::new();
