@@ -2,6 +2,10 @@
 
 mod columns;
 
+use std::fmt;
+
+use rayon::prelude::*;
+
 pub(super) use columns::columns;
 
 use super::{
@@ -93,12 +97,14 @@ pub(super) struct Shot<'a> {
     footprints: &'a Footprints<BodyFixed>,
     names: &'a dyn ShotNames,
     row: usize,
+    /// The ground point, body-fixed.
+    xyz_m: [f64; 3],
 }
 
 /// Texts of footprints.
 pub(super) trait ShotNames: Sync {
-    /// Identifiers of the windows that hold the shot in this row, separated by semicolons.
-    fn windows(&self, row: usize) -> String;
+    /// Writes the identifiers of the windows that hold the shot in this row, separated by semicolons.
+    fn write_windows(&self, row: usize, out: &mut dyn fmt::Write) -> fmt::Result;
 
     /// Its UTC; unknown for shots of tables without this column.
     fn utc(&self, _row: usize) -> Utc {
@@ -107,8 +113,11 @@ pub(super) trait ShotNames: Sync {
 }
 
 impl ShotNames for SiteProducts<'_> {
-    fn windows(&self, row: usize) -> String {
-        self.window_ids(self.footprints.windows[row])
+    fn write_windows(&self, row: usize, out: &mut dyn fmt::Write) -> fmt::Result {
+        let mask = self.footprints.windows[row];
+        let windows = self.config.windows.iter().enumerate();
+        let held = windows.filter(|(bit, _)| mask >> bit & 1 == 1);
+        write_list(held.map(|(_, window)| window.id.as_str()), out)
     }
 
     fn utc(&self, row: usize) -> Utc {
@@ -116,14 +125,36 @@ impl ShotNames for SiteProducts<'_> {
     }
 }
 
-impl<'a> Shot<'a> {
-    /// The shot in this row of a site's footprints.
-    pub(super) const fn of(site: &'a SiteProducts<'a>, row: usize) -> Self {
-        Self {
-            footprints: site.footprints,
-            names: site,
-            row,
+/// Writes texts separated by semicolons.
+pub(super) fn write_list<'a>(
+    texts: impl Iterator<Item = &'a str>,
+    out: &mut dyn fmt::Write,
+) -> fmt::Result {
+    for (place, text) in texts.enumerate() {
+        if place > 0 {
+            out.write_char(';')?;
         }
+        out.write_str(text)?;
+    }
+    Ok(())
+}
+
+impl<'a> Shot<'a> {
+    fn new(footprints: &'a Footprints<BodyFixed>, names: &'a dyn ShotNames, row: usize) -> Self {
+        let (longitude_rad, latitude_rad) =
+            (footprints.longitude_rad[row], footprints.latitude_rad[row]);
+        let radius_m = footprints.ground_radius_m(row);
+        Self {
+            footprints,
+            names,
+            row,
+            xyz_m: spherical_to_xyz_m(longitude_rad, latitude_rad, radius_m).into(),
+        }
+    }
+
+    /// The shot in this row of a site's footprints.
+    pub(super) fn of(site: &'a SiteProducts<'a>, row: usize) -> Self {
+        Self::new(site.footprints, site, row)
     }
 
     /// All of these footprints.
@@ -131,19 +162,15 @@ impl<'a> Shot<'a> {
         footprints: &'a Footprints<BodyFixed>,
         names: &'a dyn ShotNames,
     ) -> Vec<Self> {
-        let shot = |row| Self {
-            footprints,
-            names,
-            row,
-        };
-        (0..footprints.len()).map(shot).collect()
+        let rows = (0..footprints.len()).into_par_iter();
+        rows.map(|row| Self::new(footprints, names, row)).collect()
     }
 
     /// Name of the PEDR file.
-    fn file_name(&self) -> String {
+    fn file_name(&self) -> &'a str {
         let file = usize::from(self.get(|of| &of.file));
         let source = self.footprints.files.get(file);
-        source.map_or_else(String::new, |source| source.name.clone())
+        source.map_or("", |source| &source.name)
     }
 
     /// The column of footprints that `of` picks, in the shot's row.
@@ -165,19 +192,17 @@ impl<'a> Shot<'a> {
         degrees(latitude.to_areographic(self.footprints.body.model()).0)
     }
 
-    fn xyz_m(&self, axis: usize) -> f64 {
-        let longitude_rad = self.get(|of| &of.longitude_rad);
-        let latitude_rad = self.get(|of| &of.latitude_rad);
-        let radius_m = self.footprints.ground_radius_m(self.row);
-        spherical_to_xyz_m(longitude_rad, latitude_rad, radius_m)[axis]
-    }
-
     pub(super) fn point_deg(&self) -> [f64; 2] {
-        [
-            signed_longitude_deg(self.get(|of| &of.longitude_rad)),
-            degrees(self.get(|of| &of.latitude_rad)),
-        ]
+        point_deg(self.footprints, self.row)
     }
+}
+
+/// Longitude (-180..180) and latitude of the footprint in this row, degrees.
+pub(super) fn point_deg(footprints: &Footprints<BodyFixed>, row: usize) -> [f64; 2] {
+    [
+        signed_longitude_deg(footprints.longitude_rad[row]),
+        degrees(footprints.latitude_rad[row]),
+    ]
 }
 
 /// All footprints of a site.
@@ -189,9 +214,9 @@ pub(super) fn table<'a>(site: &'a SiteProducts<'a>) -> Table<'a> {
 /// The footprints of a site for GIS.
 pub(super) fn features<'a>(site: &'a SiteProducts<'a>) -> Features<'a> {
     let body = site.config.body;
-    let point = |shot: &Shot| {
-        let [east_deg, north_deg] = shot.point_deg();
-        let height_m = shot.get(|footprints| &footprints.radius_crossover_m) - body.map().radius_m;
+    let point = |row: usize| {
+        let [east_deg, north_deg] = point_deg(site.footprints, row);
+        let height_m = site.footprints.radius_crossover_m[row] - body.map().radius_m;
         [east_deg, north_deg, height_m]
     };
     let rows = 0..site.footprints.len();
@@ -199,7 +224,7 @@ pub(super) fn features<'a>(site: &'a SiteProducts<'a>) -> Features<'a> {
         body,
         &site.config.site,
         site.newest_utc(),
-        rows.map(|row| point(&Shot::of(site, row))).collect(),
+        rows.map(point).collect(),
         table(site),
     )
 }
@@ -228,5 +253,5 @@ pub(super) fn schema() -> DocumentSchema {
 /// Longitude (-180..180) and latitude of every footprint, degrees.
 pub(super) fn points_deg(site: &SiteProducts) -> Vec<[f64; 2]> {
     let rows = 0..site.footprints.len();
-    rows.map(|row| Shot::of(site, row).point_deg()).collect()
+    rows.map(|row| point_deg(site.footprints, row)).collect()
 }

@@ -1,7 +1,7 @@
 //! Shots found by a search of the archive, written as they arrive: the same columns as `footprints.parquet`.
 
 use std::{
-    mem,
+    fmt, mem,
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -14,7 +14,7 @@ use super::{
     coordinates::frame,
     error::ProductError,
     files::to_value,
-    footprints::{Shot, ShotNames, columns},
+    footprints::{Shot, ShotNames, columns, write_list},
     geoparquet::geo_metadata,
     parquet,
     rows_file::{GEOMETRY, RowsFormat, RowsWriter, SEARCH},
@@ -52,20 +52,16 @@ struct FoundShots<'a> {
 }
 
 impl ShotNames for FoundShots<'_> {
-    fn windows(&self, row: usize) -> String {
+    fn write_windows(&self, row: usize, out: &mut dyn fmt::Write) -> fmt::Result {
         let windows = self.windows.of(row).iter();
         let ids = windows.filter_map(|window| self.window_ids.get(*window as usize));
-        ids.map(String::as_str).collect::<Vec<_>>().join(";")
+        write_list(ids.map(String::as_str), out)
     }
 }
 
 impl FoundShots<'_> {
     fn rows(&self) -> Vec<Shot<'_>> {
         Shot::all_of(self.footprints, self)
-    }
-
-    fn points_deg(&self) -> Vec<[f64; 2]> {
-        self.rows().iter().map(Shot::point_deg).collect()
     }
 }
 
@@ -263,7 +259,8 @@ impl ShotsFile {
             windows,
             window_ids: &self.window_ids,
         };
-        let points_deg = shots.points_deg();
+        let rows = shots.rows();
+        let points_deg: Vec<[f64; 2]> = rows.iter().map(Shot::point_deg).collect();
         for [east, north] in &points_deg {
             let [west, south, eastern, northern] =
                 self.bounds.unwrap_or([*east, *north, *east, *north]);
@@ -274,7 +271,7 @@ impl ShotsFile {
                 northern.max(*north),
             ]);
         }
-        let table = table(shots.rows(), self.format);
+        let table = table(rows, self.format);
         let path = &self.path;
         let bare = parquet::schema(&table);
         let mut batch = parquet::record_batch(&table, &bare, 0..table.rows()).in_file(path)?;

@@ -81,7 +81,7 @@ impl Serialize for Properties<'_> {
                 Values::Integer(of) => map.serialize_entry(name, &of[self.row])?,
                 Values::Flag(of) => map.serialize_entry(name, &of[self.row])?,
                 Values::Time(of) => map.serialize_entry(name, &format!("{}Z", of[self.row]))?,
-                Values::Text(of) => map.serialize_entry(name, &of[self.row])?,
+                Values::Text(of) => map.serialize_entry(name, of.value(self.row))?,
                 Values::Bytes(_) => {}
             }
         }

@@ -4,14 +4,15 @@ use serde_json::{Value, json};
 
 use areograph_base::body::Body;
 
+/// Byte order and type of a point in little-endian well-known binary.
+const POINT: [u8; 5] = [1, 1, 0, 0, 0];
+
 /// Little-endian well-known binary of a point (OGC 06-103r4, 8.2).
-pub(super) fn well_known_binary(point: [f64; 2]) -> Vec<u8> {
-    const LITTLE_ENDIAN: u8 = 1;
-    const POINT: u32 = 1;
-    let mut bytes = vec![LITTLE_ENDIAN];
-    bytes.extend(POINT.to_le_bytes());
-    bytes.extend(point[0].to_le_bytes());
-    bytes.extend(point[1].to_le_bytes());
+pub(super) fn well_known_binary(point: [f64; 2]) -> [u8; 21] {
+    let mut bytes = [0; 21];
+    bytes[..5].copy_from_slice(&POINT);
+    bytes[5..13].copy_from_slice(&point[0].to_le_bytes());
+    bytes[13..].copy_from_slice(&point[1].to_le_bytes());
     bytes
 }
 
@@ -21,7 +22,7 @@ pub(super) fn point_of(bytes: &[u8]) -> Option<[f64; 2]> {
     let (axes, _) = bytes.as_chunks();
     let point = axes.iter().map(|axis| f64::from_le_bytes(*axis));
     let point: [f64; 2] = point.collect::<Vec<_>>().try_into().ok()?;
-    (head == [1, 1, 0, 0, 0]).then_some(point)
+    (head == POINT).then_some(point)
 }
 
 /// The `geo` key of a table of points on `body` within a box (west, south, east, north, degrees).

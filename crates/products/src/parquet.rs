@@ -10,8 +10,8 @@ use ::parquet::{
     errors::ParquetError,
 };
 use arrow_array::{
-    Array as _, ArrayRef, BinaryArray, BooleanArray, Float64Array, GenericByteArray, Int32Array,
-    RecordBatch, StringArray, TimestampMicrosecondArray, UInt32Array,
+    Array as _, ArrayRef, BooleanArray, Float64Array, GenericByteArray, Int32Array, RecordBatch,
+    TimestampMicrosecondArray, UInt32Array,
     cast::AsArray as _,
     types::{ByteArrayType, Float64Type},
 };
@@ -169,8 +169,8 @@ fn array(values: Values) -> ArrayRef {
             let times = TimestampMicrosecondArray::from_iter_values(values);
             Arc::new(times.with_timezone(UTC))
         }
-        Values::Text(values) => Arc::new(StringArray::from_iter_values(values)),
-        Values::Bytes(values) => Arc::new(BinaryArray::from_iter_values(values)),
+        Values::Text(values) => Arc::new(values),
+        Values::Bytes(values) => Arc::new(values),
     }
 }
 
@@ -297,7 +297,7 @@ mod tests {
                     Utc::from_microseconds(i64::from(row.0) + later)
                 }),
                 column("geometry", Unit::None, "", move |row: &(i32, bool)| {
-                    vec![row.0.to_le_bytes()[0], u8::from(row.1 && column_at == 4)]
+                    [row.0.to_le_bytes()[0], u8::from(row.1 && column_at == 4)]
                 }),
             ];
             Table::of(columns, 5 * ROWS_AT_ONCE + 3, of)

@@ -7,7 +7,7 @@ use std::{
 };
 
 use ::parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
-use arrow_array::{Array, ArrayRef, RecordBatch, cast::AsArray as _, types};
+use arrow_array::{Array, ArrayRef, RecordBatch, StringArray, cast::AsArray as _, types};
 use arrow_schema::{DataType, FieldRef, SchemaRef, TimeUnit};
 use rayon::prelude::*;
 
@@ -332,13 +332,12 @@ fn values_of(name: &str, array: &ArrayRef) -> Result<Values> {
                     .collect(),
             )
         }
+        DataType::Utf8 if is_whole => Values::Text(array.as_string().clone()),
         DataType::Utf8 => {
             let texts = array.as_string::<i32>().iter();
-            Values::Text(
-                texts
-                    .map(|text| text.unwrap_or_default().to_owned())
-                    .collect(),
-            )
+            Values::Text(StringArray::from_iter_values(
+                texts.map(Option::unwrap_or_default),
+            ))
         }
         other => {
             let (name, holds) = (name.to_owned(), other.to_string());

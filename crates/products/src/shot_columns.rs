@@ -1,7 +1,7 @@
 //! Shots of an archive as columns of a table that is queried: columns of `footprints.parquet` that need neither windows
 //! nor kernels.
 
-use std::sync::Arc;
+use std::{fmt, sync::Arc};
 
 use arrow_array::{RecordBatch, RecordBatchOptions};
 use arrow_schema::SchemaRef;
@@ -32,8 +32,8 @@ pub struct ShotColumns {
 struct Nameless;
 
 impl ShotNames for Nameless {
-    fn windows(&self, _row: usize) -> String {
-        String::new()
+    fn write_windows(&self, _row: usize, _out: &mut dyn fmt::Write) -> fmt::Result {
+        Ok(())
     }
 }
 

@@ -223,18 +223,6 @@ impl<'a> SiteProducts<'a> {
         accuracy_withheld(self.config, self.images.iter().map(|image| image.times))
     }
 
-    /// Identifiers of the windows in `mask`, separated by semicolons.
-    pub(super) fn window_ids(&self, mask: u64) -> String {
-        let held = self
-            .config
-            .windows
-            .iter()
-            .enumerate()
-            .filter(|(bit, _)| mask >> bit & 1 == 1);
-        let ids: Vec<&str> = held.map(|(_, window)| window.id.as_str()).collect();
-        ids.join(";")
-    }
-
     /// The spacecraft whose kernels are read: the one with the laser, unless only kernels of another are needed, and
     /// others.
     #[must_use]

@@ -5,8 +5,9 @@
 //! column("range_m", Unit::Metre, "one-way range", |shot: &Shot| shot.range_m).in_gis().in_dbase("range_m", 12, 3)
 //! ```
 
-use std::{borrow::Cow, ops::Range};
+use std::{borrow::Cow, fmt, ops::Range};
 
+use arrow_array::{BinaryArray, StringArray, builder::StringBuilder};
 use rayon::prelude::*;
 
 use super::error::ProductError;
@@ -141,6 +142,27 @@ pub(super) fn column<R, T: Cell>(
     }
 }
 
+/// The column `name` of texts, each of which `append` writes; cheaper than a text of its own for every row.
+pub(super) fn text_column<R>(
+    name: &'static str,
+    description: &'static str,
+    append: impl Fn(&R, &mut StringBuilder) -> fmt::Result + Send + Sync + 'static,
+) -> Column<R> {
+    let gather = move |rows: &[R]| {
+        let mut texts = StringBuilder::with_capacity(rows.len(), 0);
+        for row in rows {
+            // Writing to memory cannot fail.
+            let _infallible = append(row, &mut texts);
+            texts.append_value("");
+        }
+        Values::Text(texts.finish())
+    };
+    Column {
+        values: Box::new(gather),
+        ..column(name, Unit::None, description, |_: &R| String::new())
+    }
+}
+
 impl<R> Column<R> {
     /// Printed with a fixed number of decimals.
     pub(super) const fn decimals(mut self, decimals: usize) -> Self {
@@ -187,32 +209,48 @@ pub(super) trait Cell: Sized {
 }
 
 macro_rules! cells {
-    ($($type:ty: $kind:ident, $values:ident;)*) => {
+    ($($type:ty: $kind:ident;)*) => {
         $(impl Cell for $type {
             const KIND: Kind = Kind::$kind;
 
             fn gather(cells: Vec<Self>) -> Values {
-                Values::$values(cells)
+                Values::$kind(cells)
             }
         })*
 
-        /// Values of one type.
+        /// Values of one type; none of the texts and bytes is missing.
         #[derive(Debug, PartialEq)]
         pub(super) enum Values {
             OptionalReal(Vec<Option<f64>>),
-            $($values(Vec<$type>),)*
+            Text(StringArray),
+            Bytes(BinaryArray),
+            $($kind(Vec<$type>),)*
         }
     };
 }
 
 cells! {
-    f64: Real, Real;
-    u32: Natural, Natural;
-    i32: Integer, Integer;
-    bool: Flag, Flag;
-    Utc: Time, Time;
-    String: Text, Text;
-    Vec<u8>: Bytes, Bytes;
+    f64: Real;
+    u32: Natural;
+    i32: Integer;
+    bool: Flag;
+    Utc: Time;
+}
+
+impl Cell for String {
+    const KIND: Kind = Kind::Text;
+
+    fn gather(cells: Vec<Self>) -> Values {
+        Values::Text(StringArray::from_iter_values(cells))
+    }
+}
+
+impl<const LENGTH: usize> Cell for [u8; LENGTH] {
+    const KIND: Kind = Kind::Bytes;
+
+    fn gather(cells: Vec<Self>) -> Values {
+        Values::Bytes(BinaryArray::from_iter_values(cells))
+    }
 }
 
 impl Cell for Option<f64> {
@@ -243,7 +281,8 @@ impl Values {
 pub(super) struct Table<'a> {
     columns: Vec<(usize, Meaning)>,
     rows: usize,
-    values: Box<dyn Fn(usize, Range<usize>) -> Values + Sync + 'a>,
+    /// The values of some columns, by their declared places, in some rows.
+    values: Box<dyn Fn(&[usize], Range<usize>) -> Vec<Values> + Sync + 'a>,
 }
 
 impl<'a> Table<'a> {
@@ -256,9 +295,9 @@ impl<'a> Table<'a> {
         Self {
             columns: meanings(&columns).into_iter().enumerate().collect(),
             rows: count,
-            values: Box::new(move |column, range| {
+            values: Box::new(move |places, range| {
                 let rows: Vec<R> = range.map(&row).collect();
-                (columns[column].values)(&rows)
+                gather(&columns, places, &rows)
             }),
         }
     }
@@ -268,7 +307,7 @@ impl<'a> Table<'a> {
         Self {
             columns: meanings(&columns).into_iter().enumerate().collect(),
             rows: rows.len(),
-            values: Box::new(move |column, range| (columns[column].values)(&rows[range])),
+            values: Box::new(move |places, range| gather(&columns, places, &rows[range])),
         }
     }
 
@@ -347,21 +386,19 @@ impl<'a> Table<'a> {
         &self,
         rows: Range<usize>,
     ) -> std::result::Result<Vec<Values>, ProductError> {
-        let of_column = |(index, column): &(usize, Meaning)| {
-            let values = (self.values)(*index, rows.clone());
-            match values.not_finite() {
-                None => Ok(values),
-                Some(row) => Err(ProductError::NotFinite {
-                    what: format!(
-                        "column {}, row {} of {}",
-                        column.name,
-                        rows.start + row + 1,
-                        self.rows
-                    ),
-                }),
-            }
-        };
-        self.columns.par_iter().map(of_column).collect()
+        let places: Vec<usize> = self.columns.iter().map(|(place, _)| *place).collect();
+        let values = (self.values)(&places, rows.clone());
+        let bad = self.columns().zip(&values).find_map(|(column, values)| {
+            let row = rows.start + values.not_finite()? + 1;
+            Some(format!(
+                "column {}, row {row} of {}",
+                column.name, self.rows
+            ))
+        });
+        match bad {
+            None => Ok(values),
+            Some(what) => Err(ProductError::NotFinite { what }),
+        }
     }
 
     /// All rows in pieces that fit into memory.
@@ -378,6 +415,12 @@ impl<'a> Table<'a> {
             Some(small.by_ref().take(tasks).collect())
         })
     }
+}
+
+/// The values of the columns at these places in some rows.
+fn gather<R: Sync>(columns: &[Column<R>], places: &[usize], rows: &[R]) -> Vec<Values> {
+    let columns = places.par_iter().map(|place| &columns[*place]);
+    columns.map(|column| (column.values)(rows)).collect()
 }
 
 /// `rows` rows in pieces of at most this size.
@@ -427,7 +470,7 @@ pub(super) mod tests {
             let none = |name| column(name, Unit::None, "", |(): &()| String::new());
             let columns = vec![
                 none("text").in_dbase("text", 0, 0).last_in_gis(),
-                column("bytes", Unit::None, "", |(): &()| vec![1_u8]),
+                column("bytes", Unit::None, "", |(): &()| [1_u8]),
                 column("number_m", Unit::Metre, "", |(): &()| 1.0).in_dbase("number", 5, 1),
                 column("utc", Unit::None, "", |(): &()| Utc::from_microseconds(0)).in_gis(),
             ];
@@ -443,7 +486,7 @@ pub(super) mod tests {
         assert_eq!(names(table().for_text()), ["text", "number_m", "utc"]);
         assert_eq!(names(table().for_gis()), ["utc", "text"]);
         assert_eq!(names(table().for_dbase()), ["number_m", "text"]);
-        let text = [Values::Real(vec![1.0]), Values::Text(vec![String::new()])];
+        let text = [Values::Real(vec![1.0]), Values::Text(vec![""].into())];
         assert_eq!(table().for_dbase().values(0..1).unwrap(), text);
     }
 }

@@ -74,16 +74,16 @@ fn rows_as_text(table: &Table, rows: Range<usize>) -> Result<Vec<u8>> {
 
 /// The first rows of these columns, each with the decimals of its numbers.
 pub(super) fn values_as_text(columns: &[(Option<usize>, &Values)], rows: usize) -> Vec<u8> {
-    let (mut text, mut cell) = (Vec::new(), Vec::new());
+    /// Enough for most columns.
+    const CELL_BYTES: usize = 16;
+    let mut text = Vec::with_capacity(rows * columns.len() * CELL_BYTES);
     for row in 0..rows {
         for (place, (decimals, values)) in columns.iter().enumerate() {
             if place > 0 {
                 text.push(b',');
             }
-            if matches!(values, Values::Text(_)) {
-                cell.clear();
-                put_cell(&mut cell, *decimals, values, row);
-                put_quoted(&mut text, &cell, columns.len());
+            if let Values::Text(texts) = values {
+                put_quoted(&mut text, texts.value(row).as_bytes(), columns.len());
             } else {
                 put_cell(&mut text, *decimals, values, row);
             }
@@ -140,7 +140,7 @@ fn put_cell(text: &mut Vec<u8>, decimals: Option<usize>, values: &Values, row: u
         Values::Integer(values) => put_whole(text, values[row]),
         Values::Flag(values) => put(text, format_args!("{}", values[row])),
         Values::Time(values) => put(text, format_args!("{}Z", values[row])),
-        Values::Text(values) => text.extend_from_slice(values[row].as_bytes()),
+        Values::Text(values) => text.extend_from_slice(values.value(row).as_bytes()),
         Values::Bytes(_) => {}
     }
 }
@@ -154,7 +154,9 @@ fn put_whole(text: &mut Vec<u8>, value: impl itoa::Integer) {
 fn put_shortest(text: &mut Vec<u8>, value: f64) {
     let mut buffer = zmij::Buffer::new();
     let digits = buffer.format_finite(value);
-    if digits.contains('e') {
+    // An exponent has at most three digits and a sign.
+    let has_exponent = digits.bytes().rev().take(5).any(|byte| byte == b'e');
+    if has_exponent {
         let _infallible = write!(text, "{value}");
     } else {
         text.extend_from_slice(digits.strip_suffix(".0").unwrap_or(digits).as_bytes());
@@ -250,7 +252,7 @@ mod tests {
             column("b", Unit::None, "", |row: &Row| row.1.to_owned()),
             column("c_km", Unit::Kilometre, "", |row: &Row| row.2).decimals(6),
             column("d", Unit::None, "", |row: &Row| row.3),
-            column("e", Unit::None, "", |_: &Row| vec![1_u8]),
+            column("e", Unit::None, "", |_: &Row| [1_u8]),
         ];
         let rows = vec![
             (0.1 + 0.2, "x, \"y\"", 3_394.123_456_5, None),

@@ -125,8 +125,8 @@ fn value(values: &Values, row: usize) -> Value {
                 .format("%Y-%m-%dT%H:%M:%S%.3fZ")
                 .to_string(),
         ),
-        Values::Text(of) => Value::Text(of[row].clone()),
-        Values::Bytes(of) => Value::Blob(of[row].clone()),
+        Values::Text(of) => Value::Text(of.value(row).to_owned()),
+        Values::Bytes(of) => Value::Blob(of.value(row).to_owned()),
     }
 }
 

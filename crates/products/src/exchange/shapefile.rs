@@ -8,6 +8,7 @@ use std::{
     path::Path,
 };
 
+use arrow_array::StringArray;
 use shapefile::{
     NO_DATA, PointZ, ShapeReader, ShapeWriter,
     dbase::{
@@ -184,7 +185,10 @@ enum Cell<'a> {
 /// The values with instants as texts: dBASE has days only.
 fn texts(values: Vec<Values>) -> Vec<Values> {
     let text = |values: Values| match values {
-        Values::Time(times) => Values::Text(times.iter().map(|utc| format!("{utc}Z")).collect()),
+        Values::Time(times) => {
+            let texts = times.iter().map(|utc| format!("{utc}Z"));
+            Values::Text(StringArray::from_iter_values(texts))
+        }
         values => values,
     };
     values.into_iter().map(text).collect()
@@ -197,7 +201,7 @@ fn cell(values: &Values, row: usize) -> Cell<'_> {
         Values::Natural(of) => Cell::Number(Some(of[row].into())),
         Values::Integer(of) => Cell::Number(Some(of[row].into())),
         Values::Flag(of) => Cell::Number(Some(of[row].into())),
-        Values::Text(of) => Cell::Text(&of[row]),
+        Values::Text(of) => Cell::Text(of.value(row)),
         // Instants are texts here, see `texts`.
         Values::Time(_) | Values::Bytes(_) => Cell::Text(""),
     }
@@ -255,7 +259,7 @@ fn text_widths(table: &Table) -> Result<Vec<Option<u8>>> {
     for rows in table.pieces() {
         for (width, values) in widths.iter_mut().zip(texts(table.values(rows)?)) {
             if let (Some(width), Values::Text(texts)) = (width, values) {
-                let longest = texts.iter().map(String::len).max().unwrap_or(0);
+                let longest = texts.iter().flatten().map(str::len).max().unwrap_or(0);
                 let longest = u8::try_from(longest.min(TEXT_MAX)).unwrap_or(u8::MAX);
                 *width = longest.max(*width);
             }

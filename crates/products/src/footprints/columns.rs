@@ -1,10 +1,12 @@
 //! The columns of a shot.
 
+use std::fmt::Write as _;
+
 use super::{
     super::{
         coordinates::degrees,
         geoparquet::well_known_binary,
-        table::{Column, Unit, column},
+        table::{Column, Unit, column, text_column},
     },
     Shot,
 };
@@ -54,8 +56,8 @@ fn identity<'a>() -> Vec<Column<Shot<'a>>> {
         )
         .in_gis()
         .in_dbase("orbit", 10, 0),
-        column("source_file", Unit::None, "{shot_file}", |shot: &Shot| {
-            shot.file_name()
+        text_column("source_file", "{shot_file}", |shot: &Shot, out| {
+            out.write_str(shot.file_name())
         })
         .in_gis()
         .in_dbase("file", 0, 0),
@@ -100,11 +102,10 @@ fn quality<'a>() -> Vec<Column<Shot<'a>>> {
             "source of the orbit: 0 for JPL, otherwise the number of the gravity model",
             |shot: &Shot| u32::from(shot.get(|footprints| &footprints.orbit_quality)),
         ),
-        column(
+        text_column(
             "windows",
-            Unit::None,
             "identifiers of the windows that contain the shot, separated by semicolons",
-            |shot: &Shot| shot.names.windows(shot.row),
+            |shot: &Shot, out| shot.names.write_windows(shot.row, out),
         )
         .last_in_gis(),
     ]
@@ -173,19 +174,19 @@ fn heights<'a>() -> Vec<Column<Shot<'a>>> {
             "x_m",
             Unit::Metre,
             "{frame} body-fixed X of the ground point, with the radius that all stages use, metres",
-            |shot: &Shot| shot.xyz_m(0),
+            |shot: &Shot| shot.xyz_m[0],
         ),
         column(
             "y_m",
             Unit::Metre,
             "{frame} body-fixed Y of the ground point, with the radius that all stages use, metres",
-            |shot: &Shot| shot.xyz_m(1),
+            |shot: &Shot| shot.xyz_m[1],
         ),
         column(
             "z_m",
             Unit::Metre,
             "{frame} body-fixed Z of the ground point, with the radius that all stages use, metres",
-            |shot: &Shot| shot.xyz_m(2),
+            |shot: &Shot| shot.xyz_m[2],
         ),
     ]
 }
