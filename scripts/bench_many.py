@@ -100,4 +100,5 @@ def main():
             measure(wish.program, many_ties(mission, count), out)
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -141,7 +141,8 @@ declare_table! {
     pub struct ChangesConfig {
         /// Time between two polls of all folders.
         scan_interval_s: f64 = key(from_to(0.05, 86_400.0)).or(60.0),
-        /// Time without changes in a folder after which the folder is used: mirrors copy slowly.
+        /// Time without changes in a folder of kernels or data after which the folder is used, since mirrors copy files in
+        /// pieces. Where files appear whole, by renaming, 0 suffices: a file is then used when two polls find it unchanged.
         quiet_period_s: f64 = key(from_to(0.0, 86_400.0)).or(600.0),
         /// Largest share of files that may disappear from a folder; above this limit, the folder is treated as
         /// unavailable, and the sites that use it wait.

@@ -173,7 +173,11 @@ fn note_poll<W: Workers>(
         found: listing.as_ref().map_err(|why| &**why),
         now_ms,
         max_loss: config.changes.max_loss,
-        quiet_ms: milliseconds(config.changes.quiet_period_s),
+        quiet_ms: match folder.kind {
+            // Small files, which are not copied in pieces.
+            RootKind::Sites => 0,
+            _ => milliseconds(config.changes.quiet_period_s),
+        },
     });
     let Polled {
         root: now,

@@ -92,6 +92,21 @@ fn only_the_sites_that_read_a_changed_kernel_run_and_the_reason_is_kept() {
 }
 
 #[test]
+fn a_site_file_is_used_when_two_polls_find_it_unchanged() {
+    let (world, life) = two_sites("");
+    let text = world.text("sites/b.toml").unwrap();
+    for minute in 0..3 {
+        world.put("sites/b.toml", &text[..text.len() / 2 + minute]);
+        life.go_on(&world, 60, 1);
+        assert_eq!(later_jobs(&life), [], "still being written");
+    }
+    world.site("b", &["both.bc", "unused.bc"]);
+    life.go_on(&world, 60, 2);
+    assert_eq!(later_jobs(&life), [("b".to_owned(), JobState::Succeeded)]);
+    assert_eq!(world.current("b"), world.clean("b"));
+}
+
+#[test]
 fn a_touch_hashes_a_file_and_runs_nothing() {
     let (world, life) = two_sites("");
     world.put("kernels/both.bc", "first");
