@@ -79,7 +79,7 @@ fn a_pair_counts_once_and_sizes_matter() {
     assert!(
         printed.starts_with("2 pairs of images")
             && printed.contains(
-                "not used: eos_chasma, E02-02855 and E04-01275: in an earlier site as well"
+                "not used: eos_chasma, E02-02855 and E04-01275: also in an earlier site"
             ),
         "{printed}"
     );

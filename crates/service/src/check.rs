@@ -42,8 +42,8 @@ pub struct Finding {
 /// Failures that a service reports only once it needs the subject.
 #[derive(Debug, thiserror::Error, Cause)]
 enum Fault {
-    #[error("the folder cannot be written by this user")]
-    #[cause(Io: "give the folder to the user of the service, or name another folder in [outputs]")]
+    #[error("this user cannot write to the folder")]
+    #[cause(Io: "make the user of the service the owner of the folder, or name another folder in [outputs]")]
     NotWritable,
     #[error(
         "{left_mib} MiB are free, less than workers.min_free_mib = {least_mib}: no run would start"
