@@ -72,7 +72,9 @@ impl Kind {
                 "the published value is compared with independent data: real shots, or results of code without access \
                  to the published value, on orbits from first principles"
             }
-            Self::Arithmetic => "a formula applied to the paper's own numbers, which tests the paper",
+            Self::Arithmetic => {
+                "a formula applied to the paper's own numbers, which tests the paper"
+            }
             Self::Constants => {
                 "values of instruments and of Mars that are known independently, and values prescribed by the method"
             }

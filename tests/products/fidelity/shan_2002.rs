@@ -121,7 +121,13 @@ fn right() -> Vec<Comparison> {
             3,
         )
         .between(0.12, 0.13),
-        derived("look at the end, °", "not published", RIGHT.look_deg(0.5), 3).between(0.111, 0.121),
+        derived(
+            "look at the end, °",
+            "not published",
+            RIGHT.look_deg(0.5),
+            3,
+        )
+        .between(0.111, 0.121),
     ]
 }
 
@@ -193,15 +199,7 @@ fn points() -> Vec<Comparison> {
     let inside = seen
         .iter()
         .filter(|at| at.iter().zip(half).all(|(at, half)| at.abs() <= half));
-    all.push(
-        number(
-            "points inside the image",
-            "10",
-            inside.count() as f64,
-            0,
-        )
-        .exact(),
-    );
+    all.push(number("points inside the image", "10", inside.count() as f64, 0).exact());
     let [_, pixel] = image_of(&RIGHT.misprinted().model(), POINTS_KM[0]);
     let of = "y of the first point with the misprinted Y, px";
     all.push(derived(of, "in the image", pixel, 0).shown());
