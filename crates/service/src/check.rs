@@ -144,7 +144,7 @@ fn running(state: &Path) -> Result<Option<Owner>> {
     }
 }
 
-/// The free space for a folder.
+/// Free space on the disk of a folder.
 fn room(folder: &Path, least_mib: u64) -> Result<String> {
     match free_mib(&above(folder)) {
         None => Ok("the system does not report the free space".to_owned()),
