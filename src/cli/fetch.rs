@@ -102,7 +102,7 @@ enum Kind {
     Pedr,
     /// Images with their labels.
     Images,
-    /// Tables of shots of windows.
+    /// Tables of the shots in windows.
     Shots,
 }
 

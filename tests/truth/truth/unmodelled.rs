@@ -85,7 +85,7 @@ const KINDS: &[Kind] = &[
         ..UNCHANGED
     },
     Kind {
-        words: "all heights of shots 5 m low, with their ranges",
+        words: "all heights of shots too low by 5 m, with consistent ranges",
         files: |case, _| {
             of_shots(case, RADII, "add = -500", None);
             of_shots(case, RANGES, "add = 500", None);
@@ -94,13 +94,13 @@ const KINDS: &[Kind] = &[
         ..UNCHANGED
     },
     Kind {
-        words: "radii of shots 10 m too large, without their ranges",
+        words: "radii of shots too large by 10 m, with unchanged ranges",
         files: |case, _| of_shots(case, RADII, "add = 1000", None),
         answer: Answer::Invalid,
         ..UNCHANGED
     },
     Kind {
-        words: "heights of profiles off nadir 10 m high, with their ranges",
+        words: "heights of profiles off nadir too high by 10 m, with consistent ranges",
         files: |case, _| {
             off_nadir(case, RADII, "add = 1000");
             off_nadir(case, RANGES, "add = -930");
@@ -108,7 +108,7 @@ const KINDS: &[Kind] = &[
         ..UNCHANGED
     },
     Kind {
-        words: "heights of profiles off nadir 25 m high, with their ranges",
+        words: "heights of profiles off nadir too high by 25 m, with consistent ranges",
         files: |case, _| {
             off_nadir(case, RADII, "add = 2500");
             off_nadir(case, RANGES, "add = -2325");
@@ -137,7 +137,7 @@ const KINDS: &[Kind] = &[
         ..UNCHANGED
     },
     Kind {
-        words: "noise of tie points twice the stated one",
+        words: "noise of tie points twice the stated value",
         errors: |of| of.tie_noise_factor = 2.0,
         ..UNCHANGED
     },
@@ -163,7 +163,7 @@ const KINDS: &[Kind] = &[
         ..UNCHANGED
     },
     Kind {
-        words: "samples of tie points off by up to 2 pixels with the square of the distance from the middle column",
+        words: "errors of tie point samples of up to 2 pixels, in proportion to the square of the distance from the middle column",
         files: |case, _| {
             in_ties(case, |_, [line, sample]| {
                 let off = (sample - MIDDLE_COLUMN) / MIDDLE_COLUMN;
@@ -174,7 +174,7 @@ const KINDS: &[Kind] = &[
         ..UNCHANGED
     },
     Kind {
-        words: "noise of the samples of tie points three times the stated one",
+        words: "noise of the samples of tie points three times the stated value",
         files: samples_scatter,
         answer: Answer::NotTested(ACROSS),
         ..UNCHANGED
@@ -222,7 +222,7 @@ const KINDS: &[Kind] = &[
         ..UNCHANGED
     },
     Kind {
-        words: "one frame in five too high by 30 m, with its ranges",
+        words: "one frame in five too high by 30 m, with consistent ranges",
         files: |case, _| {
             of_shots(case, RADII, "add = 3000", Some(5));
             of_shots(case, RANGES, "add = -3000", Some(5));
@@ -231,7 +231,7 @@ const KINDS: &[Kind] = &[
         ..UNCHANGED
     },
     Kind {
-        words: "one frame in 20 too high by 300 m, with its ranges, like a cloud",
+        words: "one frame in 20 too high by 300 m, with consistent ranges, like a cloud",
         files: |case, _| {
             of_shots(case, RADII, "add = 30000", Some(20));
             of_shots(case, RANGES, "add = -30000", Some(20));
