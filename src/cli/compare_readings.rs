@@ -16,11 +16,11 @@ use crate::{
 
 /// Compares causes of the along-track disagreement of images over many pairs.
 ///
-/// Either every image has an error of its own, by its line times or its attitude; or attitudes were read at times with one
-/// offset, which displaces images that follow nadir and not those held inertially. One pair does not distinguish the causes
+/// Either every image has its own error, in its line times or its attitude; or attitudes were read at times with one offset,
+/// which displaces images that follow nadir, but not inertially held images. One pair does not distinguish the causes
 /// (`adjustment.attitude_clock` is a decision); many pairs of one mission may. The products contain the disagreement of each
 /// pair with the orientation from the kernels; every site must have complete products of this version. Images are identified by
-/// `id`; the same two images in several sites are one observation. Leave out the pairs of Shan et al. 2005: the hypothesis of an
+/// `id`; the same two images in several sites are one observation. Omit the pairs of Shan et al. 2005: the hypothesis of an
 /// offset, and the default sizes, come from them. A cause is supported if its odds are 150 to 1 or more.
 ///
 /// Examples:
@@ -29,19 +29,19 @@ use crate::{
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
-    /// Products of a site, or output folders of which every site is used.
+    /// Products of a site, or output folders, from which every site is used.
     #[arg(required = true, value_name = "OUT")]
     folders: Vec<PathBuf>,
-    /// Size of large errors of single images, as a standard deviation of line times, 1e-3 to 1e5; by default as
-    /// `adjustment.line_time_sigma_ms`.
+    /// Size of large errors of single images, as a standard deviation of line times, 1e-3 to 1e5; by default
+    /// that of `adjustment.line_time_sigma_ms`.
     #[arg(long, value_name = "MILLISECONDS", value_parser = sigma)]
     line_time_sigma_ms: Option<f64>,
-    /// Size of small errors of single images, as a standard deviation of rotations, 1e-3 to 1e5; by default as
-    /// `adjustment.attitude_clock_rotation_sigma_arcsec`.
+    /// Size of small errors of single images, as a standard deviation of rotations, 1e-3 to 1e5; by default
+    /// that of `adjustment.attitude_clock_rotation_sigma_arcsec`.
     #[arg(long, value_name = "ARCSECONDS", value_parser = sigma)]
     rotation_sigma_arcsec: Option<f64>,
-    /// A priori standard deviation of the offset of the attitude clock, 1e-3 to 1e5; by default as
-    /// `adjustment.attitude_clock_sigma_s`.
+    /// A priori standard deviation of the offset of the attitude clock, 1e-3 to 1e5; by default
+    /// that of `adjustment.attitude_clock_sigma_s`.
     #[arg(long, value_name = "SECONDS", value_parser = sigma)]
     attitude_clock_sigma_s: Option<f64>,
     /// Print JSON, with all pairs.

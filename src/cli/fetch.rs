@@ -24,11 +24,11 @@ use crate::{
 
 /// Fetches the files that a site needs from the archives of the mission.
 ///
-/// A site file states what is needed: its images, and the folders and files that do not exist yet. Without one, options
-/// state it. Kernels are chosen by the coverage in the index of their archive, laser files by orbits, images by the
-/// cumulative index, tables of shots by the windows. Transfers are resumed, verified by size and checksum or by their
-/// rows, and appear whole or not at all; fetch.json records what every file is. Other files are never replaced without
-/// --replace.
+/// A site file states what is needed: its images, and the folders and files that do not exist yet. Without a site file,
+/// options state it. Kernels are chosen by the coverage in the index of their archive, laser files by orbits, images by
+/// the cumulative index, tables of shots by the windows. Transfers are resumed, and verified by size and checksum, or
+/// by their rows; a file appears complete or not at all. fetch.json records every file. Other files are never replaced
+/// without --replace.
 ///
 /// Examples:
 ///   areograph fetch gale.toml --index
@@ -85,7 +85,7 @@ pub(super) struct Arguments {
     /// Compare the folder with the copies of the indexes: what is missing, differs or is not needed, and exit.
     #[arg(long)]
     audit: bool,
-    /// Do not ask for new indexes first.
+    /// Do not request new indexes first.
     #[arg(long)]
     offline_index: bool,
     /// Replace files with different content.
@@ -102,7 +102,7 @@ enum Kind {
     Pedr,
     /// Images with their labels.
     Images,
-    /// Tables of shots of windows.
+    /// Tables of the shots in windows.
     Shots,
 }
 

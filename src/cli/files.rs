@@ -11,9 +11,9 @@ use crate::{
 pub(super) struct FileKind {
     /// What such a file is.
     what: &'static str,
-    /// Endings of the files that a folder stands for, in upper or lower case.
+    /// Endings of the files in a folder that are named by it, in upper or lower case.
     endings: &'static [&'static str],
-    /// Whether a folder also stands for files in the folders below it.
+    /// Whether a folder also names files in the folders below it.
     below: bool,
 }
 
@@ -54,7 +54,7 @@ pub(super) const TIES: FileKind = FileKind {
     below: true,
 };
 
-/// Reasons why a path stands for no file.
+/// Reasons why a path names no file.
 #[derive(Debug, thiserror::Error, Cause)]
 enum NoFiles {
     #[error("the folder contains no {what} (*.{})", .endings.join(", *."))]
@@ -72,7 +72,7 @@ enum NoFiles {
 }
 
 /// The files that these paths name, in the order of the paths, those of a folder or of a glob sorted. A path that
-/// leads nowhere is kept: opening it reports the reason.
+/// does not exist is kept: opening it reports the reason.
 ///
 /// # Errors
 /// A folder or a glob without such a file; a folder that cannot be listed.
@@ -90,10 +90,10 @@ pub(super) fn expand(paths: &[PathBuf], kind: &FileKind) -> Result<Vec<PathBuf>>
     Ok(files)
 }
 
-/// Makes sure that every path leads to a file or folder.
+/// Ensures that every path is a file or folder.
 ///
 /// # Errors
-/// A path that leads nowhere.
+/// A path that does not exist.
 pub(super) fn exist(paths: &[PathBuf]) -> Result<()> {
     paths.iter().try_for_each(|path| {
         std::fs::metadata(path)

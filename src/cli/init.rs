@@ -26,9 +26,9 @@ use crate::{
 
 /// Writes a commented site file for a window and images.
 ///
-/// On a terminal the command asks for missing options. The file is DIR/SITE.toml; paths are given relative to the current
-/// folder and written relative to DIR. Without --box the window is the area that the images cover, and 5 km around it; without
-/// images it is the box around the shots of the tables.
+/// On a terminal, the command asks for missing options. The file is DIR/SITE.toml; paths are given relative to the current
+/// folder and written relative to DIR. Without --box, the window is the area that the images cover, with a margin of 5 km;
+/// without images, it is the box around the shots of the tables.
 ///
 /// Examples:
 ///   areograph init gale
@@ -60,7 +60,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "PATH", num_args = 1..)]
     pedr: Vec<PathBuf>,
     /// Shot tables from the Orbital Data Explorer, folders or globs of them; with --place, the tables that
-    /// `areograph fetch` requests, in place of PEDR files.
+    /// `areograph fetch` requests, instead of PEDR files.
     #[arg(long, value_name = "PATH", num_args = 1.., conflicts_with = "pedr")]
     shots: Vec<PathBuf>,
     /// Labels of images, folders or globs of them.

@@ -18,10 +18,10 @@ use crate::{
     store::page::PagePath,
 };
 
-/// Rebuilds the report of a site from its products only, or compares two runs.
+/// Rebuilds the report of a site from its products alone, or compares two runs.
 ///
-/// No site file, kernel or stored stage is read; the page is byte for byte the one that `areograph run` wrote.
-/// Products that are missing, damaged or of another version are refused.
+/// No site file, kernel or stored stage is read; the page is identical, byte for byte, to the page that
+/// `areograph run` wrote. Products that are missing, damaged or of another version are refused.
 ///
 /// Examples:
 ///   areograph report products/gusev_crater
@@ -60,8 +60,8 @@ enum Command {
 /// Compares two runs: inputs, verdicts, statistics, and movements of all results.
 ///
 /// Only products are read, and they are checked against their manifests.
-/// A and B are folders of one site, or output folders of which every common site is compared.
-/// A movement is B − A. The exit code is 5 if a movement exceeds a limit.
+/// A and B are folders of one site, or output folders, whose common sites are compared. A movement
+/// is B − A. The exit code is 5 if a movement exceeds a limit.
 ///
 /// Example: `areograph report diff out.yesterday out --limit-m 5 --page diff.html`
 #[derive(Debug, Args)]

@@ -77,10 +77,11 @@ struct MissionArguments {
         requires = "realistic"
     )]
     tie_noise_px: f64,
-    /// With --realistic: one offset of the attitude's clock for all images instead of line times of each.
+    /// With --realistic: one offset of the attitude clock for all images instead of line-time errors of
+    /// single images.
     #[arg(long, requires = "realistic")]
     attitude_clock: bool,
-    /// With --attitude-clock: this offset instead of one that is drawn, -100 to 100.
+    /// With --attitude-clock: this offset instead of a random one, -100 to 100.
     #[arg(
         long,
         value_name = "SECONDS",

@@ -89,7 +89,7 @@ fn init(folder: &Path) -> Result<(), Error> {
     output::line(format_args!(
         "{folder}: a synthetic mission and a configuration; next:\n\
          \x20 areograph serve {path}\n\
-         and, once its sites have run, a later orbit, to show the movement:\n\
+         and, once its sites have run, a later orbit, to show its effect:\n\
          \x20 cp {} {}",
         later.display(),
         used.display()

@@ -146,7 +146,7 @@ impl Needs {
                 },
             }),
             None => self.notes.push(format!(
-                "image {}: the identifier matches no product of the index; times and files are not known",
+                "image {}: the identifier matches no product in the index; times and files are unknown",
                 image.id
             )),
         }

@@ -23,7 +23,7 @@ use crate::{
 enum ReadingsError {
     /// No site has a pair that shows a displacement along the track.
     #[error(
-        "no pair of images that shows a cause in {0}; expected two images with common tie points, flown in one direction and apart across the track"
+        "no pair of images in {0} shows a cause; expected two images with common tie points, flown in the same direction and apart across the track"
     )]
     #[cause(Input: "name products of sites with such pairs")]
     NoPairs(String),
@@ -33,7 +33,7 @@ enum ReadingsError {
     SeveralSpacecraft(String),
     /// A standard deviation is far beyond its usual size.
     #[error("the pairs and the standard deviations do not determine probabilities")]
-    #[cause(Configuration: "give standard deviations of the size of their defaults")]
+    #[cause(Configuration: "give standard deviations similar to their defaults")]
     NotANumber,
 }
 
@@ -145,8 +145,8 @@ pub fn compare_readings(folders: &[PathBuf], sigmas: ReadingSigmas) -> Result<Re
                     });
                     continue;
                 }
-                Some(_) => "in an earlier site as well",
-                None => "not flown in one direction, or not apart across the track",
+                Some(_) => "also in an earlier site",
+                None => "not flown in the same direction, or not apart across the track",
             };
             not_used.push((format!("{site}, {}", images.join(" and ")), reason));
         }

@@ -78,9 +78,8 @@ fn a_pair_counts_once_and_sizes_matter() {
     let printed = text(&succeed(&mut command).stdout);
     assert!(
         printed.starts_with("2 pairs of images")
-            && printed.contains(
-                "not used: eos_chasma, E02-02855 and E04-01275: in an earlier site as well"
-            ),
+            && printed
+                .contains("not used: eos_chasma, E02-02855 and E04-01275: also in an earlier site"),
         "{printed}"
     );
     // Smaller errors of single images explain 250 m less.

@@ -173,7 +173,7 @@ fn limits_on_the_movement_give_exit_code_5() {
     let printed = diff(&case, &["before", "out", "--limit-arcsec", "19"]);
     assert!(
         printed.starts_with(
-            "exit 5\ncase: BEYOND THE LIMIT: image image: the camera turned by up to 20."
+            "exit 5\ncase: BEYOND THE LIMIT: image image: the camera rotated by up to 20."
         ),
         "{printed}"
     );
@@ -334,7 +334,7 @@ fn another_adjustment_moves_what_it_adjusts() {
     let printed = diff(&case, &["before", "out", "--limit-arcsec", "0.001"]);
     assert!(
         printed.starts_with(
-            "exit 5\nisidis: BEYOND THE LIMIT: image E02-01301, adjusted: the camera turned"
+            "exit 5\nisidis: BEYOND THE LIMIT: image E02-01301, adjusted: the camera rotated"
         ),
         "{printed}"
     );
@@ -356,10 +356,10 @@ fn the_page_opens_with_the_outcome_and_needs_nothing_from_outside() {
     assert!(diff(&case, &arguments).starts_with("exit 5\n"));
     let page = String::from_utf8(case.read("diff.html")).unwrap();
     let outcome =
-        page.find("case: BEYOND THE LIMIT: image image: the camera turned by up to 20.000 arcsec");
+        page.find("case: BEYOND THE LIMIT: image image: the camera rotated by up to 20.000 arcsec");
     assert!(outcome.unwrap() < page.find("<table").unwrap());
     assert!(page.contains("mgs_sc_scene.bc (CK) changed; 6 unchanged"));
-    assert_eq!(page.matches("<svg").count(), 2); // the camera turned and did not move; a map of the ground
+    assert_eq!(page.matches("<svg").count(), 2); // the camera rotated and did not move; a map of the ground
     // On the map only the boresight has moved, by turn times range, in kilometres.
     let map = page::csv(&page, "case-movements-on-the-ground");
     let moved_m: Vec<f64> = map

@@ -128,7 +128,7 @@ type Mistake = (&'static str, fn(&mut Value), i32, &'static str);
 
 const MISTAKES: [Mistake; 4] = [
     (
-        "turned by 10 mrad",
+        "rotated by 10 mrad",
         |isd| {
             let turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 0.010);
             for row in isd["instrument_pointing"]["quaternions"]

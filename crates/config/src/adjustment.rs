@@ -92,7 +92,7 @@ declare_table! {
             "all images are equally likely to be in error",
             "nadir-following images are in error, by one offset",
         )).or(false),
-        /// File in which `areograph compare-readings --toml` printed its result over many pairs of images. It decides on
+        /// File with the result that `areograph compare-readings --toml` printed for many pairs of images. It decides
         /// `attitude_clock`: "yes" if the pairs support one offset, otherwise "no".
         readings: Option<ReadingsDecision> = key(DecisionFile).unused(r#""readings.toml""#),
         /// Standard deviation of the time offset of the attitudes (`attitude_clock`).

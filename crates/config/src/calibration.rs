@@ -17,7 +17,7 @@ use areograph_base::{
 
 use super::{
     declare::{Declare as _, Keys, Many, declare_table, key, of_the_file, table, tables},
-    document::Document,
+    document::{Document, with_file},
     forms::{
         Switch, above_to, any_text, from_to, identifier, lower_case_identifier, whole_from_to,
         words,
@@ -86,14 +86,7 @@ impl Document for CalibrationConfig {
          files and the agreement between keys.",
     ];
 
-    fn with_file(self, file: PathBuf, blake3: String, keys: BTreeMap<String, String>) -> Self {
-        Self {
-            file,
-            blake3,
-            keys,
-            ..self
-        }
-    }
+    with_file!();
 }
 
 /// Required entries.

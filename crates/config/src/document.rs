@@ -76,6 +76,21 @@ pub trait Document: Table {
     }
 }
 
+/// [`Document::with_file`] of a table with the fields `file`, `blake3` and `keys`.
+macro_rules! with_file {
+    () => {
+        fn with_file(self, file: PathBuf, blake3: String, keys: BTreeMap<String, String>) -> Self {
+            Self {
+                file,
+                blake3,
+                keys,
+                ..self
+            }
+        }
+    };
+}
+pub(super) use with_file;
+
 /// A configuration that passed every check.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Loaded<T> {

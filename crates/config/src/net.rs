@@ -9,7 +9,7 @@ use areograph_geom::conformal_map::{ConformalMap, Projection};
 
 use super::{
     declare::{Declare as _, Keys, declare_table, group, key, of_the_file, table},
-    document::Document,
+    document::{Document, with_file},
     forms::{above_to, any_text, from_to, lower_case_identifier, whole_from_to, words, yes_or_no},
     paths::Globs,
 };
@@ -60,14 +60,7 @@ impl Document for NetConfig {
          agreement between keys.",
     ];
 
-    fn with_file(self, file: PathBuf, blake3: String, keys: BTreeMap<String, String>) -> Self {
-        Self {
-            file,
-            blake3,
-            keys,
-            ..self
-        }
-    }
+    with_file!();
 }
 
 /// Required entries, and entries that are never used.

@@ -86,7 +86,7 @@ impl ReadingsDecision {
                 review.problem(
                     None,
                     format!(
-                        "supported is \"{}\", which contradicts the odds; expected the file as it was printed",
+                        "supported is \"{}\", which contradicts the odds; expected the file as printed",
                         decision.word()
                     ),
                 );

@@ -13,7 +13,7 @@ use serde::Serialize;
 
 use super::{
     declare::{Declare as _, Keys, Many, declare_table, key, of_the_file, table, tables},
-    document::Document,
+    document::{Document, with_file},
     forms::{any_text, from_to, list, list_or_none, matching, text, whole_from_to, words},
     paths::MIRROR,
 };
@@ -79,14 +79,7 @@ impl Document for ServiceConfig {
          between keys, and the existence of folders.",
     ];
 
-    fn with_file(self, file: PathBuf, blake3: String, keys: BTreeMap<String, String>) -> Self {
-        Self {
-            file,
-            blake3,
-            keys,
-            ..self
-        }
-    }
+    with_file!();
 }
 
 declare_table! {

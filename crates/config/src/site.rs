@@ -20,7 +20,7 @@ use areograph_base::{
 use super::{
     adjustment::AdjustmentConfig,
     declare::{Keys, declare_table, key, no_repeats, of_the_file, table, tables},
-    document::Document,
+    document::{Document, with_file},
     forms::{any_text, lower_case_identifier, words},
     images::{IMAGES, ImageConfig},
     instruments::{ALTIMETER, built_in_altimeters, usual_altimeter, usual_instrument},
@@ -123,14 +123,7 @@ impl Document for SiteConfig {
          the order within windows, and the agreement between keys.",
     ];
 
-    fn with_file(self, file: PathBuf, blake3: String, keys: BTreeMap<String, String>) -> Self {
-        Self {
-            file,
-            blake3,
-            keys,
-            ..self
-        }
-    }
+    with_file!();
 }
 
 impl SiteConfig {

@@ -112,7 +112,7 @@ pub enum FetchError {
     },
     /// A service made another table than was asked for.
     #[error("{url} does not match the query: {problem}")]
-    #[cause(Input: "run again: the service makes a new table; otherwise open the query in a browser (`areograph fetch --plan` \
+    #[cause(Input: "run again: the service then generates a new table; otherwise open the query in a browser (`areograph fetch --plan` \
                    lists it)")]
     Table {
         /// Address of the table at the service.

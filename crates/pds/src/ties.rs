@@ -50,7 +50,7 @@ enum TieError {
     #[cause("convert it with ISIS: cnetbin2pvl from=control.net to=control.pvl")]
     BinaryVersion(u64),
     #[error("{key} of the label of a binary control network is {value}; expected a number")]
-    #[cause("transfer the file again as binary, or write it again with ISIS")]
+    #[cause("transfer the file again in binary mode, or rewrite it with ISIS")]
     BinaryLabel { key: &'static str, value: String },
     #[error(
         "the file has {bytes} bytes; expected the {what} of a binary control network up to byte {end}"
@@ -87,8 +87,8 @@ enum TieError {
     #[error("no record of the file can be read ({0} in all); record {1}: {2}")]
     #[cause(like = Column)]
     Unreadable(usize, u64, String),
-    #[error("no point of the control network can be read ({0} complaints); entry {1}: {2}")]
-    #[cause("write the network again with ISIS")]
+    #[error("no point of the control network can be read ({0} errors); entry {1}: {2}")]
+    #[cause("rewrite the network with ISIS")]
     UnreadableNetwork(usize, u64, String),
     #[error(transparent)]
     #[cause(like = NoNetwork)]

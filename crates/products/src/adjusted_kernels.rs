@@ -181,7 +181,7 @@ pub(super) static METAKERNEL: Declaration = Declaration {
     uses: &[],
 };
 
-/// Whether the image with this index has this kernel. Images with support data get none.
+/// Whether the image with this index has this kernel. Images with support data have none.
 pub(super) fn has(site: &SiteProducts, kernel: &Declaration, index: usize) -> bool {
     let adjusted = site.adjustment().map(|(_, adjustment)| adjustment.images);
     adjusted.is_some_and(|images| {

@@ -38,7 +38,7 @@ pub(super) static CSV: Declaration = Declaration {
 
 pub(super) static LABEL: Declaration = Declaration {
     path: "footprints.xml",
-    what: "label of footprints.csv in the style of PDS4",
+    what: "PDS4-style label of footprints.csv",
     readers: "archives",
     rows: "shots",
     role: Role::Metadata,
@@ -240,8 +240,8 @@ pub(super) fn schema() -> DocumentSchema {
     let table = Table::new(columns(), Vec::new()).for_gis();
     let schema = geojson::schema(
         "Footprints as GeoJSON",
-        "footprints.geojson of areograph: laser shots inside the windows, on the sphere of the body, with latitudes at its \
-         centre; west > east in a bbox that crosses the antimeridian.",
+        "footprints.geojson of areograph: laser shots inside the windows, on the sphere of the body, with \
+         planetocentric latitudes; west > east in a bbox that crosses the antimeridian.",
         &table.columns().cloned().collect::<Vec<_>>(),
     );
     DocumentSchema {

@@ -45,7 +45,7 @@ const DEFINITIONS: [(&str, &str); 5] = [
     ),
     (
         "left_out",
-        "profiles that lie above or below three or more others by one constant, beyond five standard deviations, or that are \
+        "profiles that lie above or below three or more others by a constant of more than five standard deviations, or that are \
          misplaced: the misfit of their heights at crossovers is too large; the surface between shots does not use them",
     ),
     (

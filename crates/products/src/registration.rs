@@ -277,8 +277,8 @@ fn places<'a>() -> Vec<Column<Registered<'a>>> {
         column(
             "y_px",
             Unit::Pixel,
-            "across-track focal-plane coordinate from the boresight, image pixels, y of the papers \
-            (against the samples)",
+            "across-track focal-plane coordinate from the boresight, image pixels, y of the papers (opposite to the \
+            samples)",
             |point: &Registered| point.get(|points| &points.y_px),
         ),
         column(

@@ -124,7 +124,7 @@ fn state_of(standing: Standing) -> String {
     match standing {
         Standing::Present => "present".to_owned(),
         Standing::Unknown => "present, of unknown origin".to_owned(),
-        Standing::Other => "present, but another file".to_owned(),
+        Standing::Other => "present, but a different file".to_owned(),
         Standing::Begun(bytes) => format!("begun, {bytes} bytes"),
         Standing::Missing => "missing".to_owned(),
     }

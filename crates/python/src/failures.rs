@@ -93,7 +93,8 @@ pub(crate) fn usage(message: impl Into<String>) -> PyErr {
     UsageError::new_err(message.into())
 }
 
-/// Runs `work` without the lock of the interpreter; it stops early when Python receives a signal that raises.
+/// Runs `work` without the global interpreter lock; it stops early when a signal handler of Python raises an
+/// exception.
 ///
 /// # Errors
 /// The exception of a failure, or of the signal.

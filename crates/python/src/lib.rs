@@ -1,7 +1,8 @@
 //! The native module of the Python package: functions of the program with columns, texts and numbers as arguments.
 //!
 //! The package in `python/areograph` holds the interface for users; it converts data frames and arrays, and documents
-//! units. Long calls release the lock of the interpreter and stop on Ctrl-C. A failure is an exception by its kind.
+//! units. Long calls release the global interpreter lock and stop on Ctrl-C. A failure raises the exception of its
+//! kind.
 
 #![allow(
     clippy::needless_pass_by_value,

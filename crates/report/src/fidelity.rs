@@ -103,7 +103,7 @@ fn kinds(fidelity: &Fidelity) -> Markup {
             Column::Number("agree"),
             Column::Number("in part"),
             Column::Number("explained"),
-            Column::Number("no number of ours"),
+            Column::Number("not computed"),
             Column::Text("meaning"),
         ],
     );
@@ -135,9 +135,9 @@ fn section(paper: &FidelityPaper) -> Section {
             Column::Text("kind: verdict"),
             Column::Text("place"),
             Column::Text("what"),
-            Column::Text("printed; ours (tolerance)"),
-            Column::Text("not printed: derived, or of another paper; ours"),
-            Column::Text("ours from"),
+            Column::Text("published; computed (tolerance)"),
+            Column::Text("not published (derived, or from another paper); computed"),
+            Column::Text("source of the computed value"),
             Column::Text("notes"),
         ],
     );
@@ -150,8 +150,8 @@ fn section(paper: &FidelityPaper) -> Section {
                 row.place.into(),
                 row.what.into(),
                 lines("", &row.numbers),
-                lines("not printed", &row.derived),
-                labelled("ours from", &row.from),
+                lines("not published", &row.derived),
+                labelled("computed from", &row.from),
                 row.note.into(),
             ],
         );

@@ -22,7 +22,7 @@ pub struct ReadPair {
     pub disagreement: PairDisagreement,
 }
 
-/// Causes of the along-track disagreement, compared over the pairs of some sites.
+/// Causes of the along-track disagreement, compared over the pairs of several sites.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Readings {
     /// The pairs, in the order of their sites, each once.
@@ -82,7 +82,7 @@ impl Readings {
             sentences.push("Both causes together are more probable than either alone.".to_owned());
         }
         sentences.push(format!(
-            "A decision requires odds of {DECISIVE_ODDS} to 1, and that both causes together are less probable."
+            "A decision requires odds of at least {DECISIVE_ODDS} to 1, and both causes together must be less probable."
         ));
         sentences
     }
@@ -145,8 +145,8 @@ fn pairs(readings: &Readings) -> Result<Markup> {
         Column::Text("images"),
         Column::Number("apart, m"),
         Column::Number("σ, m"),
-        Column::Number("by the clock, m/s"),
-        Column::Number("left by the clock, m"),
+        Column::Number("change with the clock, m/s"),
+        Column::Number("residual after the clock offset, m"),
     ];
     let mut table = Table::new(
         "Displacement along the track, first minus second image",
@@ -192,8 +192,8 @@ fn pairs(readings: &Readings) -> Result<Markup> {
         vec![panel],
     );
     let words = paragraph(
-        "Positions of tie points by the two images, with the orientation from the kernels. Images that follow nadir are displaced \
-         by an offset of the attitude clock, inertially held images are not.",
+        "Positions of tie points according to the two images, with the orientation from the kernels. Images that \
+         follow nadir are displaced by an offset of the attitude clock; inertially held images are not.",
     );
     Ok(html! { (words) (table.finish()) (figure(&plot)?) })
 }

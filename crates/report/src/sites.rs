@@ -94,8 +94,8 @@ pub fn sites_page(sites: &[SiteLine]) -> Result<String> {
     } else {
         Tone::Good
     };
-    let words = "Heights off: median height of the tie points above the laser surface. Images apart: along-track disagreement \
-         of the worst pair. Range − distance: largest mean of a profile.";
+    let words = "Height offset: median height of the tie points above the laser surface. Image distance: along-track \
+         disagreement of the worst pair. Range − distance: largest mean of a profile.";
     let budgets = sites.iter().filter_map(|site| site.products.as_ref());
     let budgets: Vec<UncertaintyBudget> = budgets.flat_map(|of| of.budgets.clone()).collect();
     let lead = html! {
@@ -147,8 +147,8 @@ fn table(sites: &[SiteLine]) -> Markup {
             Column::Number("shots"),
             Column::Number("profiles"),
             Column::Number("images"),
-            Column::Number("heights off, m: before → adjusted"),
-            Column::Number("images apart, m: before → adjusted"),
+            Column::Number("height offset, m: before → adjusted"),
+            Column::Number("image distance, m: before → adjusted"),
             Column::Number("range − distance, m"),
             Column::Text("against the run before"),
             Column::Text("published (UTC)"),
@@ -186,8 +186,8 @@ impl SiteSummary {
 
 /// Candidates for the headline number, with their names among the figures of a manifest.
 const HEADLINES: [(&str, &str); 3] = [
-    ("heights off", "adjusted_height_off_surface_m"),
-    ("images apart", "adjusted_along_track_parallax_m"),
+    ("height offset", "adjusted_height_off_surface_m"),
+    ("image distance", "adjusted_along_track_parallax_m"),
     ("range − distance", "range_mean_m"),
 ];
 
@@ -372,7 +372,7 @@ mod tests {
         });
         let trend = sites_page(&[line("moved", Some(moved.clone()))]).unwrap();
         assert!(trend.contains("INVALID → valid<br>"));
-        assert!(trend.contains("images apart 31.50 → 0.04 m"));
+        assert!(trend.contains("image distance 31.50 → 0.04 m"));
         moved.verdict = "INVALID";
         moved.images_apart_m = [None, None];
         let trend = sites_page(&[line("moved", Some(moved))]).unwrap();

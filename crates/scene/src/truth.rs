@@ -294,7 +294,7 @@ impl Truth {
             errors: *errors,
             errors_rule: "Members of errors are standard deviations and ranges; members of errors_drawn are values drawn from \
                 them for the day of each image. Lines were exposed time_bias_lines later than the label states. The true \
-                attitude of the bus is the C-kernel attitude without its bias, attitude_clock_s later, turned by attitude: the \
+                attitude of the bus is the C-kernel attitude without its bias, attitude_clock_s later, rotated by attitude: the \
                 matrix from J2000 to the bus is exp([e]x) times the C-kernel matrix, with e = constant + linear x + quadratic \
                 x^2 + jitter and x = (et - middle) / half_image, held beyond -4 and 4. bus_position_m (camera and laser) and \
                 camera_position_m (camera only) are added to the orbit gsfc, IAU 2000. The laser points boresight_rad from +Z \

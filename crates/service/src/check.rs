@@ -42,8 +42,8 @@ pub struct Finding {
 /// Failures that a service reports only once it needs the subject.
 #[derive(Debug, thiserror::Error, Cause)]
 enum Fault {
-    #[error("the folder cannot be written by this user")]
-    #[cause(Io: "give the folder to the user of the service, or name another folder in [outputs]")]
+    #[error("this user cannot write to the folder")]
+    #[cause(Io: "make the user of the service the owner of the folder, or name another folder in [outputs]")]
     NotWritable,
     #[error(
         "{left_mib} MiB are free, less than workers.min_free_mib = {least_mib}: no run would start"
@@ -144,7 +144,7 @@ fn running(state: &Path) -> Result<Option<Owner>> {
     }
 }
 
-/// The free space for a folder.
+/// Free space on the disk of a folder.
 fn room(folder: &Path, least_mib: u64) -> Result<String> {
     match free_mib(&above(folder)) {
         None => Ok("the system does not report the free space".to_owned()),

@@ -46,7 +46,7 @@ enum Refused {
     )]
     Public(SocketAddr),
     #[error("{0} changed")]
-    #[cause("restart the service, or restore the former value")]
+    #[cause("restart the service, or restore the previous value")]
     NeedsRestart(&'static str),
     #[error("inputs.{0}: the folder {1} does not exist and was never available to this service")]
     #[cause(
@@ -205,7 +205,7 @@ pub fn reload(shared: &Shared, listen: Option<SocketAddr>) -> Stored<()> {
     match &text {
         None => tracing::info!("the configuration {} is in force", before.file.display()),
         Some(text) => tracing::error!(
-            "the new configuration is invalid, and the former configuration remains in force: {text}"
+            "the new configuration is invalid, and the previous configuration remains in force: {text}"
         ),
     }
     shared.write(|transaction: &Transaction<'_>| {

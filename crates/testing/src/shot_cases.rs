@@ -22,6 +22,19 @@ pub struct Case {
 const START_US: i64 = 38_593_125_159_870;
 
 impl Case {
+    /// Fails unless the refusal of `file` because of shots in another file, named in the reason, is that of the case.
+    pub fn judge(&self, refusal: Option<(Option<PathBuf>, String)>, paths: &[PathBuf]) {
+        match (refusal, self.shared) {
+            (None, None) => {}
+            (Some((path, why)), Some([other, file])) => {
+                assert_eq!(path.as_ref(), Some(&paths[file]), "{}", self.name);
+                let other = paths[other].display().to_string();
+                assert!(why.contains(&other), "{}: {why}", self.name);
+            }
+            (found, _) => panic!("{}: {found:?}", self.name),
+        }
+    }
+
     /// Time tags of a file, ET seconds.
     pub fn tags_s(&self, file: usize) -> Vec<f64> {
         let tag_s = |first_us: i64, shot: u32| {

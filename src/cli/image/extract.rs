@@ -18,8 +18,8 @@ use crate::{
 
 /// Writes the pixels of an image as PNG, or as TIFF with tiles and overviews.
 ///
-/// Pixels are those of the file, line 0 first and at the top: on the day side south is up and east left. Missing lines
-/// are black; --mask distinguishes them from dark ones.
+/// Pixels are those of the file, line 0 first and at the top: on the day side, south is up and east is left. Missing
+/// lines are black; --mask distinguishes them from dark ones.
 ///
 /// Example: areograph image extract m0100115.imq --out m0100115.png
 #[derive(Debug, Args)]
@@ -32,8 +32,9 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// 16 bits: relative radiance from gain, offset and exposure, with the offset between odd and even detectors
-    /// removed (narrow angle without summing). The values do not suit geometry, and are not reflectance, whose
-    /// constants are not public. The command refuses images whose gain changes from line to line.
+    /// removed (narrow angle without summing). The values are not suited to geometric work, and are not
+    /// reflectances, whose constants are not public. The command refuses images whose gain changes from line to
+    /// line.
     #[arg(long)]
     calibrate: bool,
     /// Also write a mask of good (255), suspect (128) and missing (0) lines, in one of the same formats.
@@ -129,7 +130,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
     drop(progress);
     if complaints > 0 {
         tracing::warn!(
-            "{complaints} complaints about {}; `areograph image info` lists them",
+            "{complaints} errors in {}; `areograph image info` lists them",
             arguments.file.display()
         );
     }

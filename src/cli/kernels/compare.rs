@@ -35,7 +35,7 @@ pub(super) struct Arguments {
     /// Metakernels (.tm), two or more; without any, the rival sets of --site.
     #[arg(required_unless_present = "site", value_name = "SET.tm")]
     sets: Vec<PathBuf>,
-    /// Compare within this time, UTC, for example 1999-08-24T14:00..1999-08-24T15:00.
+    /// Compare within this interval, UTC, for example 1999-08-24T14:00..1999-08-24T15:00.
     #[arg(long, value_name = "FROM..TO", conflicts_with = "site")]
     time: Option<String>,
     /// Compare over the times for which this site needs kernels, with its pointing bias.

@@ -26,8 +26,8 @@ use crate::{
 ///
 /// The answer is JSON: every crossover with its position, the difference of the two heights and its standard deviation;
 /// for each profile its shift to the east, to the north and along the radius with covariance; and profiles that do not
-/// belong to the others. Profiles are named by window and orbit. Shifts are relative: what all profiles share is not
-/// determined.
+/// belong to the others. Profiles are named by window and orbit. Shifts are relative: a shift that all profiles share
+/// is not determined.
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("where").required(true).multiple(true).args(["box", "polygons", "windows"]))]
 #[command(
@@ -55,7 +55,7 @@ const PROFILES_MAX: usize = 2_000;
 #[cause(Configuration)]
 enum Request {
     #[error("{0} windows; expected 1 to {WINDOWS_MAX}")]
-    #[cause("give --box, --polygon or --windows; divide more windows among several commands")]
+    #[cause("give --box, --polygon or --windows; distribute more windows over several commands")]
     Windows(usize),
     #[error("{0} profiles in the windows; expected at most {PROFILES_MAX}")]
     #[cause("give smaller windows")]

@@ -26,7 +26,7 @@ use crate::{
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
-    /// Folders of PEDR files, searched below as well, and single files.
+    /// PEDR files, and folders with .b files in and below them.
     #[arg(required = true, value_name = "PATH")]
     paths: Vec<PathBuf>,
     /// Metakernel: leap seconds, clock, and the orbit of the spacecraft.

@@ -39,15 +39,15 @@ use crate::{
 ///   pulse width     counts above 127 are printed as negative                |  as they are
 ///   lists           end at the first file that cannot be opened             |  go on to the next; both end as an error
 ///
-/// Not reproduced: names are not cut at 64 characters and may hold points and folders, more than 99,999 frames are read, and
-/// an invalid trigger channel does not read beyond its table.
+/// Not reproduced: names are not cut at 64 characters and may contain dots and folders, more than 99,999 frames are read,
+/// and an invalid trigger channel does not read beyond its table.
 #[derive(Debug, Args)]
 #[command(
     verbatim_doc_comment,
     after_help = "Example: areograph pedr tab ap19019l.b --per-shot"
 )]
 pub(super) struct Arguments {
-    /// A PEDR file (its name holds .b or .B), or a text file with one file name per line.
+    /// A PEDR file (its name contains .b or .B), or a text file with one file name per line.
     #[arg(default_value = "FILELIST")]
     input: PathBuf,
     /// Preferences; by default PEDR2TAB.PRM. If that file is missing, the defaults of pedr2tab apply: ground returns, group 0,

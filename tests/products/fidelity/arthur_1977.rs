@@ -69,9 +69,9 @@ fn table_2() -> Vec<Comparison> {
     vec![
         number("sum of δX, km", "0", x.iter().sum(), 1).within(0.3),
         number("sum of δY, km", "0", y.iter().sum(), 1).within(0.3),
-        number("scale left, ppm", "0", scale_left_ppm(1.0), 0).within(250.0),
+        number("remaining scale, ppm", "0", scale_left_ppm(1.0), 0).within(250.0),
         number(
-            "scale left were it computed minus given, ppm",
+            "remaining scale for computed minus given, ppm",
             "0",
             scale_left_ppm(-1.0),
             0,
@@ -132,8 +132,8 @@ fn pictures() -> Vec<Comparison> {
         )
         .exact(),
         derived(
-            "orthographic taken for conformal at 22.5°, m at the edge",
-            "not printed",
+            "orthographic treated as conformal at 22.5°, error at the edge, m",
+            "not published",
             projection_floor_m(half_m, gradient, MARS_RADIUS_M),
             1,
         )
@@ -145,7 +145,7 @@ fn unknowns() -> Vec<Comparison> {
     let scene = nine(0.0, 1);
     let solution = solve(&scene.net).unwrap();
     let theirs = solution.redundancy.unknowns as f64 / scene.net.pictures as f64;
-    vec![number("theirs, a picture", "4", theirs, 0).exact()]
+    vec![number("in the paper, per picture", "4", theirs, 0).exact()]
 }
 
 /// A point that three held pictures show, a metre off in the first of them.
@@ -195,7 +195,7 @@ fn bricks() -> Vec<Comparison> {
     let brick_of = grow_bricks(&scene.net, 8);
     let bricks = brick_of.iter().max().unwrap() + 1;
     let mean = scene.net.pictures as f64 / bricks as f64;
-    vec![number("pictures a brick, 25 in all", "6–10", mean, 1).between(6.0, 10.0)]
+    vec![number("pictures per brick, 25 in all", "6–10", mean, 1).between(6.0, 10.0)]
 }
 
 /// Root mean square of the tie deviations of a coordinate in a brick of nine pictures, metres.
@@ -229,7 +229,7 @@ fn tie_deviations() -> Vec<Comparison> {
         number("rms, km", "0.25", rms_m / 1e3, 3).share(0.15),
         derived(
             "rms over the noise",
-            "not printed",
+            "not published",
             rms_m / SECONDARY_NOISE_M,
             2,
         )
@@ -267,7 +267,7 @@ fn gross_controls() -> Vec<Comparison> {
     let mean_m = found.iter().map(|(_, rms_m)| rms_m).sum::<f64>() / found.len() as f64;
     vec![
         number(
-            "both rejected and nothing else, of 100 seeds",
+            "both errors and no other control rejected, of 100 seeds",
             "100",
             both as f64,
             0,
@@ -284,14 +284,14 @@ fn shrinkage() -> Vec<Comparison> {
     let found = Shrinkage::of(&net, &solve(&net).unwrap()).unwrap();
     vec![
         number(
-            "distance of the controls, computed over given",
+            "distance between the controls, ratio of computed to given",
             "below 1",
             found.factor,
             4,
         )
         .between(0.99, 0.9999),
         number(
-            "the same by the law 1 / (1 + 2T/(w L²)), difference",
+            "difference from the law 1 / (1 + 2T/(w L²))",
             "0",
             found.factor - found.law,
             10,
@@ -345,12 +345,12 @@ static ROWS: [Row; 15] = [
         id: "A77-02",
         kind: Kind::ClosedLoop,
         place: "equations 2 and 3",
-        what: "unknowns of m pictures and n points: 4m + 2n, about 8m; theirs 4 a picture",
+        what: "unknowns of m pictures and n points: 4m + 2n, about 8m; in the paper, 4 per picture",
         account: Account::Agrees {
             from: "the equations of a synthetic net",
             ours: unknowns,
         },
-        note: "A rigorous solution has 4m + 2n unknowns, which are 8m with two points a picture.",
+        note: "A rigorous solution has 4m + 2n unknowns, or 8m with two points per picture.",
     },
     Row {
         id: "A77-03",
@@ -361,7 +361,7 @@ static ROWS: [Row; 15] = [
             from: "deviations of a point that is in error in one of three pictures",
             ours: thirds,
         },
-        note: "The three equations of an axis add up to zero, so that two of them are independent.",
+        note: "The three equations of an axis add up to zero, so two of them are independent.",
     },
     Row {
         id: "A77-04",
@@ -394,8 +394,8 @@ static ROWS: [Row; 15] = [
             from: "nine pictures, 200 points, noise of 385 m, 20 seeds",
             ours: tie_deviations,
         },
-        note: "The size is a closed loop: deviations are 0.65 of the noise, which is chosen by that law. The \
-               largest deviations need data.",
+        note: "The size is a closed loop: deviations are 0.65 times the noise, which is chosen accordingly. The \
+               largest deviations require data.",
     },
     Row {
         id: "A77-07",
@@ -406,8 +406,8 @@ static ROWS: [Row; 15] = [
             from: "twelve controls with 0.8 km of noise, two of them in error by 17 and 19 km in Y",
             ours: gross_controls,
         },
-        note: "The size is a closed loop. If they were rejected one at a time, as in the paper, the two errors \
-               would mask each other in every other case.",
+        note: "The size is a closed loop. If they were rejected one at a time, as in the paper, the two errors would \
+               mask each other in half of the cases.",
     },
     Row {
         id: "A77-08",
@@ -417,7 +417,7 @@ static ROWS: [Row; 15] = [
         account: Account::Data {
             printed: "59.0 56.1, 21.7 25.8; 98.5 62.2, 47.4 26.6; 43.2 33.4, 16.3 13.5",
         },
-        note: "The 25 pictures are on film that is not at hand; deviations follow the noise as in A77-06.",
+        note: "The 25 pictures are on film that is not available; deviations follow the noise, as in A77-06.",
     },
     Row {
         id: "A77-09",
@@ -439,8 +439,8 @@ static ROWS: [Row; 15] = [
             from: "the table's six points, as given minus computed",
             ours: table_2,
         },
-        note: "Both columns of residuals are headed δY; the first is δX. After a fit of shift and scale both sums \
-               and the remaining scale are zero: rounding to 0.1 km allows 0.3 km of the sums and 125 ppm of scale, \
+        note: "Both residual columns have the heading δY; the first is δX. After a fit of shift and scale, both sums \
+               and the remaining scale are zero: rounding to 0.1 km permits 0.3 km in the sums and 125 ppm in scale, \
                one standard deviation.",
     },
     Row {
@@ -452,7 +452,7 @@ static ROWS: [Row; 15] = [
             from: "the table's six points",
             ours: remarks,
         },
-        note: "The printed 1.8 km is one coordinate; the longest vector is that of point 307.",
+        note: "The published 1.8 km is one coordinate; the longest vector is that of point 307.",
     },
     Row {
         id: "A77-12",
@@ -468,18 +468,18 @@ static ROWS: [Row; 15] = [
         id: "A77-13",
         kind: Kind::ClosedLoop,
         place: "shrinkage",
-        what: "residuals at two controls point inward, though nothing is redundant",
+        what: "residuals at two controls point inward, although there is no redundancy",
         account: Account::Agrees {
             from: "nine pictures with 1 km of noise on two controls",
             ours: shrinkage,
         },
-        note: "Residuals of ties are measured in the map and shrink with it.",
+        note: "Residuals of ties are measured on the map and shrink with it.",
     },
     Row {
         id: "A77-14",
         kind: Kind::ClosedLoop,
         place: "film",
-        what: "distortion: linear, and quadratic with none at the corners",
+        what: "distortion: linear, and quadratic without distortion at the corners",
         account: Account::Agrees {
             from: "quadratic distortion with its origin at a corner",
             ours: film,

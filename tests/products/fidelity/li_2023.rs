@@ -132,7 +132,7 @@ fn expected_errors() -> Vec<Comparison> {
     let millidegrees = 1e3 * known.angle_rad / RADIANS_PER_DEGREE;
     vec![
         number("orbit, m", "1000", known.orbit_bias_m, 0).exact(),
-        number("drift, m a line", "0.01", known.orbit_drift_m_per_line, 2).exact(),
+        number("drift, m per line", "0.01", known.orbit_drift_m_per_line, 2).exact(),
         number("angle, millidegrees", "25", millidegrees, 0).exact(),
     ]
 }
@@ -369,12 +369,12 @@ static ROWS: [Row; 25] = [
         id: "L23-01",
         kind: Kind::Arithmetic,
         place: "table 1",
-        what: "HRSC: 175 mm, 7 × 7 µm, 5272 detectors a line of which 5184 are used, nine lines, ±12.8° and ±18.9°",
+        what: "HRSC: 175 mm, 7 × 7 µm, 5272 detectors per line, of which 5184 are used, nine lines, ±12.8° and ±18.9°",
         account: Account::Agrees {
             from: "focal length, pitch and angles of the table; config/instruments/hrsc_s1.toml",
             ours: camera,
         },
-        note: "The print truncates 8.25″ to 8.2″.",
+        note: "The paper truncates 8.25″ to 8.2″.",
     },
     Row {
         id: "L23-02",
@@ -428,12 +428,13 @@ static ROWS: [Row; 25] = [
         place: "eq. 16 and text",
         what: "shots of I864 and their groups",
         account: Account::Explained {
-            from: "eq. 16: cell 35.8 m, pixel 26.9 m, 0.01 m a line, spacing 300 m",
+            from: "eq. 16: cell 35.8 m, pixel 26.9 m, 0.01 m per line, spacing 300 m",
             ours: group_size,
         },
-        note: "The paper does not print the cell of 35.8 m, so that 321 depends on a value from elsewhere; 15 \
-               points would need a cell of 1.7 m. The text takes at most 15 and cites another equation. The 126 \
-               strips with 125,749 points, of which more than 10,000 (one tenth) are kept in 150 clusters, need \
+        note: "The paper does not state the cell size of 35.8 m, so the value of 321 depends on another source; 15 \
+               points would require cells of 1.7 m. The text uses at most 15 points and cites a different equation. \
+               The 126 \
+               strips with 125,749 points, of which more than 10,000 (one tenth) are kept in 150 clusters, require \
                data.",
     },
     Row {
@@ -463,92 +464,92 @@ static ROWS: [Row; 25] = [
         id: "L23-09",
         kind: Kind::Arithmetic,
         place: "table 5",
-        what: "I864 before: residual in the focal plane from its parts",
+        what: "I864 before: residual in the focal plane from its components",
         account: Account::Agrees {
             from: "root of the sum of squares across and along",
             ours: || focal(&I864_BEFORE),
         },
-        note: "The errors are across the flight, as the heads of the table state; the sentence “mainly along the \
-               flight” is wrong. This row contains no number of areograph (L23-22). Control points in plan, 25.077 \
-               and 36.195 px (682.675 and 1049.461 m), and height, 507.214 m, need data.",
+        note: "The errors are across the flight, as the column headings of the table state; the sentence “mainly along the \
+               flight” is wrong. This row contains no number computed by areograph (L23-22). Control points in plan, 25.077 \
+               and 36.195 px (682.675 and 1049.461 m), and height, 507.214 m, require data.",
     },
     Row {
         id: "L23-10",
         kind: Kind::Arithmetic,
         place: "table 5",
-        what: "I864 after: residual in the focal plane from its parts",
+        what: "I864 after: residual in the focal plane from its components",
         account: Account::Agrees {
-            from: "root of the squares across and along",
+            from: "root of the sum of squares across and along",
             ours: || focal(&I864_AFTER),
         },
-        note: "As L23-09. Control points in plan 5.650 and 5.254 px (145.314 and 144.605 m), height 63.978 m: data.",
+        note: "As for L23-09. Control points in plan 5.650 and 5.254 px (145.314 and 144.605 m), height 63.978 m require data.",
     },
     Row {
         id: "L23-11",
         kind: Kind::Arithmetic,
         place: "table 6",
-        what: "I818 as it comes: residual in the focal plane from its parts",
+        what: "I818 uncalibrated: residual in the focal plane from its components",
         account: Account::Agrees {
-            from: "root of the squares across and along",
+            from: "root of the sum of squares across and along",
             ours: || focal(&DIRECT[0]),
         },
-        note: "As L23-09. Plan 24.252 and 30.791 px (684.161 and 900.743 m), height 477.180 m: data.",
+        note: "As for L23-09. Plan 24.252 and 30.791 px (684.161 and 900.743 m), height 477.180 m require data.",
     },
     Row {
         id: "L23-12",
         kind: Kind::Arithmetic,
         place: "table 6",
-        what: "I863 as it comes: residual in the focal plane from its parts",
+        what: "I863 uncalibrated: residual in the focal plane from its components",
         account: Account::Agrees {
-            from: "root of the squares across and along",
+            from: "root of the sum of squares across and along",
             ours: || focal(&DIRECT[1]),
         },
-        note: "As L23-09. Plan 24.553 and 33.027 px (704.422 and 911.537 m), height 471.415 m: data.",
+        note: "As for L23-09. Plan 24.553 and 33.027 px (704.422 and 911.537 m), height 471.415 m require data.",
     },
     Row {
         id: "L23-13",
         kind: Kind::Arithmetic,
         place: "table 6",
-        what: "I977 as it comes: residual in the focal plane from its parts",
+        what: "I977 uncalibrated: residual in the focal plane from its components",
         account: Account::Agrees {
-            from: "root of the squares across and along",
+            from: "root of the sum of squares across and along",
             ours: || focal(&DIRECT[2]),
         },
-        note: "As L23-09. Plan 21.709 and 29.345 px (602.496 and 803.388 m), height 682.407 m: data.",
+        note: "As for L23-09. Plan 21.709 and 29.345 px (602.496 and 803.388 m), height 682.407 m require data.",
     },
     Row {
         id: "L23-14",
         kind: Kind::Arithmetic,
         place: "table 7",
-        what: "I818 with the parameters of I864: residual in the focal plane from its parts",
+        what: "I818 with the parameters of I864: residual in the focal plane from its components",
         account: Account::Agrees {
-            from: "root of the squares across and along",
+            from: "root of the sum of squares across and along",
             ours: || focal(&CALIBRATED[0]),
         },
-        note: "As L23-09. Plan 7.894 and 8.349 px (217.017 and 235.313 m), height 66.032 m: data.",
+        note: "As for L23-09. Plan 7.894 and 8.349 px (217.017 and 235.313 m), height 66.032 m require data.",
     },
     Row {
         id: "L23-15",
         kind: Kind::Arithmetic,
         place: "table 7",
-        what: "I863 with the parameters of I864: residual in the focal plane from its parts",
+        what: "I863 with the parameters of I864: residual in the focal plane from its components",
         account: Account::Agrees {
-            from: "root of the squares across and along",
+            from: "root of the sum of squares across and along",
             ours: || focal(&CALIBRATED[1]),
         },
-        note: "As L23-09. Plan 9.917 and 10.952 px (273.349 and 301.776 m), height 80.013 m: data. The second value \
+        note: "As for L23-09. Plan 9.917 and 10.952 px (273.349 and 301.776 m), height 80.013 m require data. The second value \
                in plan exceeds the “better than 300 m” of the conclusions.",
     },
     Row {
         id: "L23-16",
         kind: Kind::Arithmetic,
         place: "table 7",
-        what: "I977 with the parameters of I864: residual in the focal plane from its parts",
+        what: "I977 with the parameters of I864: residual in the focal plane from its components",
         account: Account::Agrees {
-            from: "root of the squares across and along",
+            from: "root of the sum of squares across and along",
             ours: || focal(&CALIBRATED[2]),
         },
-        note: "As L23-09. Plan 6.681 and 10.469 px (178.716 and 286.364 m), height 256.643 m: data. The row does \
+        note: "As for L23-09. Plan 6.681 and 10.469 px (178.716 and 286.364 m), height 256.643 m require data. The row does \
                not meet “below 1 px” and “within 100 m”.",
     },
     Row {
@@ -560,8 +561,8 @@ static ROWS: [Row; 25] = [
             from: "means of the six lines of tables 6 and 7",
             ours: plane_summary,
         },
-        note: "The text converts metres into pixels at 30 m; by the tables a pixel measures 25.7 to 29.3 m, with \
-               other values before than after.",
+        note: "The text converts metres into pixels of 30 m; according to the tables, a pixel measures 25.7 to 29.3 m, \
+               with different values before and after the calibration.",
     },
     Row {
         id: "L23-18",
@@ -569,7 +570,7 @@ static ROWS: [Row; 25] = [
         place: "text on tables 6 and 7",
         what: "heights before and after",
         account: Account::Agrees {
-            from: "tables 6 and 7, 30 m a pixel",
+            from: "tables 6 and 7, 30 m per pixel",
             ours: height_summary,
         },
         note: "",
@@ -583,7 +584,7 @@ static ROWS: [Row; 25] = [
             from: "tables 5 to 7",
             ours: abstract_of_it,
         },
-        note: "The paper rounds freely; I977 and I863 do not meet what it claims of all images. For heights, 500 → \
+        note: "The paper rounds generously; I977 and I863 do not meet the claims that it makes for all images. For heights, 500 → \
                100 m, see L23-18.",
     },
     Row {
@@ -602,7 +603,7 @@ static ROWS: [Row; 25] = [
         place: "section 3.1.1",
         what: "spacing of MOLA's shots",
         account: Account::Agrees {
-            from: "distances of real shots at nadir, orbit 18940",
+            from: "distances between real shots at nadir, orbit 18940",
             ours: spacing,
         },
         note: "Off nadir, with the attitude held inertially, the spacing is 340 m (S05-65).",
@@ -613,11 +614,12 @@ static ROWS: [Row; 25] = [
         place: "table 5",
         what: "I864 before, a pair",
         account: Account::InPart {
-            from: "synthetic lines with errors of the paper's size, withheld points",
+            from: "synthetic lines with errors of the published size, withheld points",
             ours: before,
         },
-        note: "The offset angles of the scene are drawn for each seed, from 0.5 to 1.5 times values that give the published residuals \
-               across; the rest follows from orbit and control of the scene.",
+        note: "The offset angles of the scene are drawn for each seed, from 0.5 to 1.5 times the values that give the \
+               published across-track residuals; the remaining numbers follow from the orbit and control of the \
+               scene.",
     },
     Row {
         id: "L23-23",
@@ -625,11 +627,11 @@ static ROWS: [Row; 25] = [
         place: "table 5",
         what: "I864 after, a pair",
         account: Account::Agrees {
-            from: "the same lines calibrated, withheld points",
+            from: "the same lines after calibration, withheld points",
             ours: after,
         },
-        note: "The noise of measurements and control is that of the scene: the sizes agree, but this is no result \
-               on HRSC images.",
+        note: "The noise of measurements and control is that of the scene: the sizes agree, but this is not a result \
+               for HRSC images.",
     },
     Row {
         id: "L23-24",
@@ -637,10 +639,10 @@ static ROWS: [Row; 25] = [
         place: "table 7",
         what: "another orbit with the parameters of I864, a pair",
         account: Account::Agrees {
-            from: "the synthetic lines in another orbit with the first one's parameters",
+            from: "the synthetic lines in another orbit, with the parameters of the first orbit",
             ours: elsewhere,
         },
-        note: "A comparison with tables 6 and 7 needs images of those orbits.",
+        note: "A comparison with tables 6 and 7 requires images of those orbits.",
     },
     Row {
         id: "L23-25",
@@ -650,6 +652,6 @@ static ROWS: [Row; 25] = [
         account: Account::Cited {
             printed: "1,138 orbits of HRSC; about two months between calibration and validation orbits; heights of 2.3 px",
         },
-        note: "The days of table 3 span 46 days.",
+        note: "The dates in table 3 span 46 days.",
     },
 ];

@@ -28,18 +28,21 @@ pub(crate) struct Row {
     pub(crate) what: &'static str,
     /// What comes of it.
     pub(crate) account: Account,
-    /// What a reader must know: how a number was read, why it is not met, what stays out of reach.
+    /// Remarks for the reader: interpretation of a number, reason for a difference, missing data.
     pub(crate) note: &'static str,
 }
 
-/// What stands beside the print, and so how much an agreement is worth.
+/// Words for a number that requires data of the papers.
+pub(crate) const NEEDS_DATA: &str = "needs data";
+
+/// What a published value is compared with, and hence the significance of an agreement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
-    /// Data that took no part.
+    /// Independent data.
     Evidence,
-    /// The paper's own prints.
+    /// The paper's own numbers.
     Arithmetic,
-    /// Values that everybody has.
+    /// Generally known values.
     Constants,
     /// areograph itself.
     ClosedLoop,
@@ -66,12 +69,14 @@ impl Kind {
     pub(crate) const fn meaning(self) -> &'static str {
         match self {
             Self::Evidence => {
-                "the print is compared with independent data: real shots, or results of code without access to the printed value, \
-                 on orbits from first principles"
+                "the published value is compared with independent data: real shots, or results of code without access \
+                 to the published value, on orbits from first principles"
             }
-            Self::Arithmetic => "a formula applied to the paper's own prints: it tests the paper",
+            Self::Arithmetic => {
+                "a formula applied to the paper's own numbers, which tests the paper"
+            }
             Self::Constants => {
-                "values of instruments and of Mars that are known independently, and givens of the method"
+                "values of instruments and of Mars that are known independently, and values prescribed by the method"
             }
             Self::ClosedLoop => {
                 "areograph against itself or its own synthetic mission, which was built with the paper's values"
@@ -108,7 +113,7 @@ pub(crate) enum Account {
         /// Printed and ours.
         ours: fn() -> Vec<Comparison>,
     },
-    /// The same for a part of the row; the rest departs, or needs data or code that are not at hand.
+    /// The same for a part of the row; the rest departs, or requires data or code that are not available.
     InPart {
         /// What ours is computed from.
         from: &'static str,
@@ -176,7 +181,7 @@ impl Verdict {
             Self::Agrees => kind.agrees(),
             Self::InPart => kind.agrees_in_part(),
             Self::Explained => "explained",
-            Self::NeedsData => "needs data",
+            Self::NeedsData => NEEDS_DATA,
             Self::Quoted => "quoted",
             Self::NotYetComputed => "not yet computed",
         }
@@ -401,7 +406,7 @@ pub(crate) fn beyond_reach(of: impl Into<String>, printed: impl Into<String>) ->
         of: of.into(),
         printed: printed.into(),
         is_derived: false,
-        ours: "needs data".to_owned(),
+        ours: NEEDS_DATA.to_owned(),
         tolerance: String::new(),
         agreement: Agreement::Shown,
     }

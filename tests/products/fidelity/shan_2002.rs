@@ -93,7 +93,7 @@ fn right() -> Vec<Comparison> {
     let end = format!("{:.2}", radius(RIGHT.end_km));
     vec![
         derived(
-            "orbit radius at the start with Y as printed, by that at the end, km",
+            "orbit radius at the start with Y as published, compared with that at the end, km",
             end.clone(),
             radius(as_printed),
             2,
@@ -116,12 +116,18 @@ fn right() -> Vec<Comparison> {
         .within(0.05),
         derived(
             "look at the start, °",
-            "not printed",
+            "not published",
             RIGHT.look_deg(-0.5),
             3,
         )
         .between(0.12, 0.13),
-        derived("look at the end, °", "not printed", RIGHT.look_deg(0.5), 3).between(0.111, 0.121),
+        derived(
+            "look at the end, °",
+            "not published",
+            RIGHT.look_deg(0.5),
+            3,
+        )
+        .between(0.111, 0.121),
     ]
 }
 
@@ -134,7 +140,7 @@ fn left() -> Vec<Comparison> {
             2,
         )
         .departs(1.0),
-        derived("look, °", "not printed", LEFT.look_deg(0.0), 2).between(19.71, 19.73),
+        derived("look, °", "not published", LEFT.look_deg(0.0), 2).between(19.71, 19.73),
         derived(
             "speed with 8064 lines, 2005, km/s",
             "3.4",
@@ -150,12 +156,12 @@ fn geometry() -> Vec<Comparison> {
     vec![
         derived(
             "base across the track, km",
-            "not printed",
+            "not published",
             found.base_m / 1e3,
             2,
         )
         .between(153.7, 153.9),
-        derived("altitude, km", "not printed", found.altitude_m / 1e3, 2).between(380.4, 380.7),
+        derived("altitude, km", "not published", found.altitude_m / 1e3, 2).between(380.4, 380.7),
         derived(
             "H/B; 2.5 in 2005",
             "2.5",
@@ -193,15 +199,7 @@ fn points() -> Vec<Comparison> {
     let inside = seen
         .iter()
         .filter(|at| at.iter().zip(half).all(|(at, half)| at.abs() <= half));
-    all.push(
-        number(
-            "points that fall into the image",
-            "10",
-            inside.count() as f64,
-            0,
-        )
-        .exact(),
-    );
+    all.push(number("points inside the image", "10", inside.count() as f64, 0).exact());
     let [_, pixel] = image_of(&RIGHT.misprinted().model(), POINTS_KM[0]);
     let of = "y of the first point with the misprinted Y, px";
     all.push(derived(of, "in the image", pixel, 0).shown());
@@ -240,11 +238,11 @@ static ROWS: [Row; 9] = [
         what: "orientation of the right image, start and end: X 2743.679, 2749.133; Y −2453.358, −2450.626; Z \
                −895.114, −836.828 km; ω 11.3701, 12.1810; φ −75.9648, −76.8692; κ −126.576, −125.6728 °",
         account: Account::Explained {
-            from: "the table; nadir of the boresight with R = [κ]₃ [φ]₂ [ω]₁, emission of table 2 in 2005",
+            from: "the table; angle between boresight and nadir with R = [κ]₃ [φ]₂ [ω]₁; emission angle of table 2 in 2005",
             ours: right,
         },
-        note: "The Y of the start is misprinted; it is −2435.358. No other order or sense of the angles looks down; \
-               the textbook's matrix of these angles is the transpose.",
+        note: "The Y of the start is misprinted; the correct value is −2435.358. With any other order or sense of the \
+               angles, the camera does not look down; the textbook matrix of these angles is the transpose.",
     },
     Row {
         id: "S02-02",
@@ -256,8 +254,9 @@ static ROWS: [Row; 9] = [
             from: "the table",
             ours: left,
         },
-        note: "The emission angle is 17.97° in 2005 and 22.0° by these angles, which also place the points of table \
-               2 far outside the image. They cannot serve as a reference for pointing.",
+        note: "The emission angle is 17.97° in the paper of 2005, but 22.0° according to these angles, which also \
+               place the points of table 2 far outside the image. These angles cannot serve as a reference for \
+               pointing.",
     },
     Row {
         id: "S02-03",
@@ -268,7 +267,7 @@ static ROWS: [Row; 9] = [
             from: "the table, across the flight of the right image",
             ours: geometry,
         },
-        note: "The values follow from the table; the paper of 2005 prints them (S05-60).",
+        note: "The values follow from the table; the paper of 2005 publishes them (S05-60).",
     },
     Row {
         id: "S02-04",
@@ -279,8 +278,9 @@ static ROWS: [Row; 9] = [
             from: "orientation of first order through table 1 with the corrected Y, 9856 lines, 3500 mm, 39 µm",
             ours: points,
         },
-        note: "Image coordinates are not printed: those in the column of numbers not printed are of an independent computation with the \
-               same formula, a test of the code and not of the paper. What the print says is that the points lie in the image.",
+        note: "Image coordinates are not published: the values in the column of unpublished numbers are from an \
+               independent computation with the same formula, which tests the code and not the paper. The paper states \
+               only that the points lie in the image.",
     },
     Row {
         id: "S02-05",
@@ -301,7 +301,7 @@ static ROWS: [Row; 9] = [
         account: Account::Data {
             printed: "about 1–2 footprints",
         },
-        note: "The paper compares by eye; S05-47 is the closed loop.",
+        note: "The paper compares visually; S05-47 is the closed loop.",
     },
     Row {
         id: "S02-07",
@@ -312,10 +312,11 @@ static ROWS: [Row; 9] = [
             from: "equatorial radius of Mars, IAU 2000; radius minus topography of real shots at the equator",
             ours: areoid,
         },
-        note: "3396 km is the mean equatorial radius of the areoid, not of the ellipsoid; at one longitude the areoid is some hundred \
-               metres off its mean. areograph subtracts the areoid that PEDR files have for each shot. The paper takes radii with \
-               all corrections, crossover residuals among them. The text turns areocentric \
-               latitudes to Cartesian coordinates as if they were areographic; areograph does not.",
+        note: "3396 km is the mean equatorial radius of the areoid, not of the ellipsoid; at a single longitude, the \
+               areoid departs from its mean by some hundred metres. areograph subtracts the areoid radius that PEDR \
+               files state for each shot. The paper uses radii with all corrections, including crossover residuals. \
+               The text converts areocentric latitudes to Cartesian coordinates as if they were areographic; areograph \
+               does not.",
     },
     Row {
         id: "S02-08",
@@ -325,7 +326,7 @@ static ROWS: [Row; 9] = [
         account: Account::Cited {
             printed: "altitude about 400 km; narrow angle 1–5 m, wide angle 230–500 m",
         },
-        note: "380.6 km by its own table.",
+        note: "Its own table gives 380.6 km.",
     },
     Row {
         id: "S02-09",

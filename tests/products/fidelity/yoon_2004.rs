@@ -153,7 +153,7 @@ fn footprints_in_images(site: Site) -> Vec<Comparison> {
         .map(|([along, _], spacing_m)| along.mean.abs() * spacing_m)
         .sum();
     let disagreement = derived(
-        "disagreement, against that of our own intersection, m",
+        "disagreement, compared with that of areograph's intersection, m",
         fixed(from_ties_m, 1),
         from_footprints_m,
         1,
@@ -187,7 +187,7 @@ fn disagreement() -> Vec<Comparison> {
             let ours_m: f64 = (printed.iter().zip(table_5.columns))
                 .map(|(px, column)| px.abs() * TABLE_2[column].line_spacing_m())
                 .sum();
-            let of = format!("{site:?}, by table 3, against table 5 of 2005, m");
+            let of = format!("{site:?}, table 3 compared with table 5 of 2005, m");
             let ours = derived(of, fixed(table_5.disagreement_m(), 1), ours_m, 1);
             if *site == Site::Eos {
                 ours.departs(100.0)
@@ -238,7 +238,7 @@ fn isidis_sigmas() -> Vec<Comparison> {
     let ours_at_most = 10.0 * adjusted.adjustment.sigma0();
     let mut all = vec![
         number(
-            "σX of MOLA, against 10 m · σ0, which it cannot exceed, m",
+            "σX of MOLA, compared with its upper bound 10 m · σ0, m",
             footprints[0],
             most_m,
             2,
@@ -265,9 +265,9 @@ fn remarks() -> Vec<Comparison> {
             0,
         )
         .departs(1.0),
-        number("ties of Eos, X, m", "91", 91.232, 0).within(0.5),
-        number("ties of Eos, Y, m", "107", 106.913, 0).within(0.5),
-        number("ties of Eos, Z, m", "55", 54.799, 0).within(0.5),
+        number("ties at Eos, X, m", "91", 91.232, 0).within(0.5),
+        number("ties at Eos, Y, m", "107", 106.913, 0).within(0.5),
+        number("ties at Eos, Z, m", "55", 54.799, 0).within(0.5),
     ]
 }
 
@@ -299,12 +299,12 @@ static ROWS: [Row; 23] = [
         place: "table 1",
         what: "images: date, exposure, file, GSD",
         account: Account::Input {
-            from: "the synthetic mission; GSD by exposure time and ground speed",
+            from: "the synthetic mission; GSD from exposure time and ground speed",
             ours: inputs,
             test: "tests/truth/scene_mission.rs::the_images_are_flown_as_table_2_prints_them",
         },
-        note: "The paper prints days of 2001 without times. For emission angles see S05-17; header lines and sum \
-               factor are not printed here.",
+        note: "The paper gives dates in 2001 without times. For emission angles, see S05-17; header lines and summing \
+               factor are not published in this paper.",
     },
     Row {
         id: "Y04-02",
@@ -316,9 +316,9 @@ static ROWS: [Row; 23] = [
             ours: priors,
             test: "crates/geom/tests/geometry/adjust_recipe.rs::the_recipe_comes_out_as_verified",
         },
-        note: "The 10 m for ranges stand for the 7 m of the instrument. The standard deviation of MOLA's image \
-               coordinates is not printed: 74 and 4 px are our choice. The 100 and 200 m apply to angles and rates \
-               as well, converted into angles by the range.",
+        note: "The 10 m for ranges represents the 7 m of the instrument. The standard deviation of MOLA's image \
+               coordinates is not published: 74 and 4 px are a choice of areograph. The 100 and 200 m also apply to \
+               angles and rates, converted into angles by the range.",
     },
     Row {
         id: "Y04-03",
@@ -334,9 +334,9 @@ static ROWS: [Row; 23] = [
                 )
             },
         },
-        note: "Means of zero are a property of any such adjustment and show nothing. “RMS” in print is the standard deviation about \
-               the mean. Those of ours are of other sizes, at Gusev and Isidis as well: they follow from the noise of the shots, for \
-               which ours have 10 m on the ground and 7 m in range.",
+        note: "Means of zero are a property of any such adjustment and are not evidence. The published “RMS” is the \
+               standard deviation about the mean. The computed standard deviations have different sizes, also at Gusev \
+               and Isidis: they follow from the noise of the shots, here 10 m on the ground and 7 m in range.",
     },
     Row {
         id: "Y04-04",
@@ -346,7 +346,7 @@ static ROWS: [Row; 23] = [
         account: Account::Data {
             printed: "91.232/117.676, 106.913/151.426, 54.799/59.585",
         },
-        note: "The rows are of two sets of kernels; the paper does not state the initial ground.",
+        note: "The rows refer to two sets of kernels; the paper does not state the initial ground points.",
     },
     Row {
         id: "Y04-05",
@@ -408,7 +408,7 @@ static ROWS: [Row; 23] = [
         account: Account::Data {
             printed: "12.789/61.724, 4.040/15.915, −8.419/−18.116, 47.103/40.515",
         },
-        note: "−18.116 is a misprint: a spread is not negative.",
+        note: "−18.116 is a misprint: a standard deviation cannot be negative.",
     },
     Row {
         id: "Y04-10",
@@ -429,7 +429,7 @@ static ROWS: [Row; 23] = [
                 )
             },
         },
-        note: "The size of σ x is that of the noise, a whole line; its division between the images is geometry. For \
+        note: "The size of σ x is that of the noise, one line; geometry determines its distribution between the images. For \
                σ y see Y04-12.",
     },
     Row {
@@ -442,10 +442,10 @@ static ROWS: [Row; 23] = [
             from: RECIPE,
             ours: || footprints_in_images(Site::Gusev),
         },
-        note: "Along the track opposite signs, and the same disagreement as the residuals of intersection. Across the track areograph \
-               is not the published model: the paper takes the place in the measured line, where the skew of the flight shows a \
-               tenth of the correction along the track; ours takes the line that sees the point (decision 0010), and its means \
-               vanish. Spreads are data.",
+        note: "Along the track, the signs are opposite, and the disagreement equals that of the intersection \
+               residuals. Across the track, areograph departs from the published model: the paper uses the position in \
+               the measured line, where the skew of the flight causes a tenth of the along-track correction; areograph \
+               uses the line that sees the point (decision 0010), and the means vanish. Spreads are data.",
     },
     Row {
         id: "Y04-12",
@@ -466,9 +466,9 @@ static ROWS: [Row; 23] = [
                 )
             },
         },
-        note: "The paper takes the coordinate across the track in the measured line, where the skew of the flight \
-               causes a tenth of the residual along the track; ours is taken in the line that sees the point. \
-               Height absorbs the rest, so that σ y is no accuracy.",
+        note: "The paper uses the across-track coordinate in the measured line, where the skew of the flight causes a \
+               tenth of the along-track residual; areograph uses the line that sees the point. The height absorbs the \
+               remainder, so σ y does not represent an accuracy.",
     },
     Row {
         id: "Y04-13",
@@ -480,7 +480,7 @@ static ROWS: [Row; 23] = [
             from: RECIPE,
             ours: || footprints_in_images(Site::Isidis),
         },
-        note: "As Y04-11; here the two differ by 2.1 %, more than the 2 % of Gusev: signs alone are claimed along the track.",
+        note: "As for Y04-11; here, the two values differ by 2.1 %, more than the tolerance of 2 % at Gusev: along the track, only the signs are compared.",
     },
     Row {
         id: "Y04-14",
@@ -512,7 +512,7 @@ static ROWS: [Row; 23] = [
             from: "Σ |x| · line spacing, tables 3 of 2004 and 5 of 2005",
             ours: disagreement,
         },
-        note: "At Eos the two papers contradict each other.",
+        note: "At Eos, the two papers contradict each other.",
     },
     Row {
         id: "Y04-16",
@@ -533,8 +533,8 @@ static ROWS: [Row; 23] = [
             from: RECIPE,
             ours: gusev_sigmas,
         },
-        note: "The size of σ0 depends on the standard deviation of MOLA's image coordinates, which is not printed; \
-               the published model of areograph gives 0.36 to 0.48 on its synthetic mission. The tolerance is a \
+        note: "The size of σ0 depends on the standard deviation of MOLA's image coordinates, which is not published; \
+               the published model in areograph gives 0.36 to 0.48 on its synthetic mission. The tolerance is a \
                factor of three.",
     },
     Row {
@@ -543,7 +543,7 @@ static ROWS: [Row; 23] = [
         place: "table 4",
         what: "standard deviations at Isidis",
         account: Account::Explained {
-            from: "10 m of MOLA's ground points times σ0; ours from first principles",
+            from: "10 m of MOLA's ground points times σ0; computed values from first principles",
             ours: isidis_sigmas,
         },
         note: "An adjustment with 10 m a priori cannot give 18.3 m: observations do not increase the standard \
@@ -563,12 +563,12 @@ static ROWS: [Row; 23] = [
         id: "Y04-20",
         kind: Kind::Arithmetic,
         place: "text on tables 2 and 4",
-        what: "MOLA moves by 4 mm to 0.1 mm; ties of Eos by 91, 107, 55 m",
+        what: "MOLA moves by 4 mm to 0.1 mm; ties at Eos by 91, 107, 55 m",
         account: Account::Explained {
             from: "the rows of table 2",
             ours: remarks,
         },
-        note: "At Isidis Z moves by 23 mm.",
+        note: "At Isidis, Z moves by 23 mm.",
     },
     Row {
         id: "Y04-21",
@@ -579,14 +579,14 @@ static ROWS: [Row; 23] = [
             from: RECIPE,
             ours: misregistration,
         },
-        note: "Closed loop: the 249 m before come from clock errors by table 5 and from errors of position. The \
+        note: "Closed loop: the 249 m before the adjustment result from clock errors of the size in table 5 and from position errors. The \
                result is relative: the two images agree afterwards, but their common position is not corrected.",
     },
     Row {
         id: "Y04-22",
         kind: Kind::Evidence,
         place: "figures",
-        what: "Gusev point 77 out of and inside a crater, then outside in both; Isidis points 6–8",
+        what: "Gusev point 77 outside a crater in one image and inside in the other, then outside in both; Isidis points 6–8",
         account: Account::Data { printed: "by eye" },
         note: "",
     },

@@ -14,25 +14,25 @@ const PAGE: &str = "docs/guide/src/wrong_inputs.md";
 const INTRODUCTION: &str = "\
 # Wrong inputs
 
-A wrong input can be plausible: it has the right form, and a run ends with numbers.
+A wrong input can be plausible: its format is correct, and the run completes.
 This page lists such inputs and the answer of areograph to each.
-A test makes every input from sound files whose truth is known, runs the program, and compares the result with the truth
+A test derives every input from sound files whose truth is known, runs the program, and compares the result with the truth
 (`tests/truth/mutations`, in the long run). The same test writes this page.
 
 - *refused*: the run ends with an error and writes no products.
 - *invalid*: the products are marked invalid with a reason. The exit code is 5.
 - *remark*: the products are valid with a remark that identifies the mistake.
 - *valid, inside*: the products are valid, and the error lies within three stated standard deviations.
-- *stated as not tested*: the products are valid. The terminal, the page and the manifest list this error among those that no
-  datum of the site tests.
+- *stated as not tested*: the products are valid. The terminal, the page and the manifest list this error among those that the
+  data of the site do not test.
 
-The error is the largest one of the mean position of the adjusted tie points, by its ratio to the stated standard deviation, on the
-axes east, north and up. Of nets and calibrations it is the root mean square of all points. Without an adjustment, it is the mean distance on the
-ground between the places that an image shows at known pixels and the true ones; nothing is stated of that distance.
-*Worst point* is the largest error of a single point in its own stated standard deviations.
+The error is that of the mean position of the adjusted tie points on one axis: east, north or up, whichever has the largest ratio to its
+stated standard deviation. For nets and calibrations, it is the root mean square over all points. Without an adjustment, it is the mean
+distance on the ground between the positions that the images give for known pixels and the true positions; no uncertainty is stated for this
+distance. *Worst point* is the largest error of a single point, divided by its own stated standard deviation.
 The table of sound inputs is for comparison.
 
-Products that are invalid, or that have a remark, can err by more than they state. A script must look at the exit code and at the remarks.
+The errors of products that are invalid, or that have a remark, can exceed the stated uncertainties. Scripts must check the exit code and the remarks.
 
 To add an input, add a row to a file of `tests/truth/mutations` and run
 `AREOGRAPH_LONG=1 SNAPSHOTS=overwrite cargo test --locked --test truth every_wrong_input`.

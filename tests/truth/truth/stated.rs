@@ -287,7 +287,7 @@ fn counts(sites: &[Site]) -> String {
     let ties = TieCounts::of(sites);
     format!(
         "Invalid sites: {refused} of {sound} with correctly placed profiles, {noticed} of {misplaced} with a misplaced profile. \
-         The valid sites lost {} of {} good tie points; blunders kept: {}.\n",
+         Good tie points lost in valid sites: {} of {}; blunders kept: {}.\n",
         ties.lost, ties.good, ties.kept_blunders
     )
 }
@@ -350,7 +350,7 @@ impl Variant {
             let lines = lines.map(|of| format!("{} ({:.2}; {})", of.name, of.z(), of.beyond()));
             let _infallible = writeln!(
                 text,
-                "The same without {misplaced} valid sites with a misplaced profile (ratio; values beyond): {}.",
+                "The same without valid sites that have a misplaced profile ({misplaced}; ratio and values beyond): {}.",
                 lines.collect::<Vec<_>>().join("; ")
             );
         }

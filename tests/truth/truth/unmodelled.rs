@@ -74,7 +74,7 @@ const RANGES: &str = r#"["ranges"]"#;
 const KINDS: &[Kind] = &[
     UNCHANGED,
     Kind {
-        words: "sign of the altimeter's clock bias",
+        words: "opposite sign of the altimeter's clock bias",
         files: |case, _| in_sites(case, "sign = \"late\"", "sign = \"early\""),
         answer: Answer::Invalid,
         ..UNCHANGED
@@ -85,7 +85,7 @@ const KINDS: &[Kind] = &[
         ..UNCHANGED
     },
     Kind {
-        words: "all heights of shots 5 m low, with their ranges",
+        words: "all heights of shots too low by 5 m, with consistent ranges",
         files: |case, _| {
             of_shots(case, RADII, "add = -500", None);
             of_shots(case, RANGES, "add = 500", None);
@@ -94,13 +94,13 @@ const KINDS: &[Kind] = &[
         ..UNCHANGED
     },
     Kind {
-        words: "radii of shots 10 m too large, without their ranges",
+        words: "radii of shots too large by 10 m, with unchanged ranges",
         files: |case, _| of_shots(case, RADII, "add = 1000", None),
         answer: Answer::Invalid,
         ..UNCHANGED
     },
     Kind {
-        words: "heights of profiles off nadir 10 m high, with their ranges",
+        words: "heights of profiles off nadir too high by 10 m, with consistent ranges",
         files: |case, _| {
             off_nadir(case, RADII, "add = 1000");
             off_nadir(case, RANGES, "add = -930");
@@ -108,7 +108,7 @@ const KINDS: &[Kind] = &[
         ..UNCHANGED
     },
     Kind {
-        words: "heights of profiles off nadir 25 m high, with their ranges",
+        words: "heights of profiles off nadir too high by 25 m, with consistent ranges",
         files: |case, _| {
             off_nadir(case, RADII, "add = 2500");
             off_nadir(case, RANGES, "add = -2325");
@@ -137,7 +137,7 @@ const KINDS: &[Kind] = &[
         ..UNCHANGED
     },
     Kind {
-        words: "noise of tie points twice the stated one",
+        words: "noise of tie points twice the stated value",
         errors: |of| of.tie_noise_factor = 2.0,
         ..UNCHANGED
     },
@@ -147,7 +147,7 @@ const KINDS: &[Kind] = &[
         ..UNCHANGED
     },
     Kind {
-        words: "noise of tie points of Student's distribution with three degrees of freedom, of the stated size",
+        words: "noise of tie points from Student's distribution with three degrees of freedom, of the stated size",
         errors: |of| of.tie_noise_factor = 0.0,
         files: noise_with_tails,
         ..UNCHANGED
@@ -163,7 +163,7 @@ const KINDS: &[Kind] = &[
         ..UNCHANGED
     },
     Kind {
-        words: "samples of tie points off by up to 2 pixels with the square of the distance from the middle column",
+        words: "errors of tie point samples of up to 2 pixels, in proportion to the square of the distance from the middle column",
         files: |case, _| {
             in_ties(case, |_, [line, sample]| {
                 let off = (sample - MIDDLE_COLUMN) / MIDDLE_COLUMN;
@@ -174,7 +174,7 @@ const KINDS: &[Kind] = &[
         ..UNCHANGED
     },
     Kind {
-        words: "noise of the samples of tie points three times the stated one",
+        words: "noise of the samples of tie points three times the stated value",
         files: samples_scatter,
         answer: Answer::NotTested(ACROSS),
         ..UNCHANGED
@@ -198,13 +198,13 @@ const KINDS: &[Kind] = &[
         ..UNCHANGED
     },
     Kind {
-        words: "orbit 80 m along",
+        words: "orbit displaced by 80 m along the track",
         files: |case, _| orbit(case, "[80, 0, 0]"),
         answer: Answer::NotTested("an orbit error along or across the track, up to 100 m"),
         ..UNCHANGED
     },
     Kind {
-        words: "orbit 80 m cross",
+        words: "orbit displaced by 80 m across the track",
         files: |case, _| orbit(case, "[0, 0, 80]"),
         ..UNCHANGED
     },
@@ -222,7 +222,7 @@ const KINDS: &[Kind] = &[
         ..UNCHANGED
     },
     Kind {
-        words: "one frame in five higher by 30 m, with its ranges",
+        words: "one frame in five too high by 30 m, with consistent ranges",
         files: |case, _| {
             of_shots(case, RADII, "add = 3000", Some(5));
             of_shots(case, RANGES, "add = -3000", Some(5));
@@ -231,7 +231,7 @@ const KINDS: &[Kind] = &[
         ..UNCHANGED
     },
     Kind {
-        words: "one frame in 20 higher by 300 m, with its ranges, like a cloud",
+        words: "one frame in 20 too high by 300 m, with consistent ranges, like a cloud",
         files: |case, _| {
             of_shots(case, RADII, "add = 30000", Some(20));
             of_shots(case, RANGES, "add = -30000", Some(20));
@@ -357,11 +357,11 @@ fn ratio(pairs: &[Pair]) -> f64 {
 const INTRODUCTION: &str = "\
 # Errors that the adjustment does not model
 
-Each row adds or enlarges one error in missions whose other errors have the sizes that areograph assumes: four missions of three sites.
-A test computes the table (`tests/truth/truth/unmodelled.rs`, in the long run) and writes this page. Sizes with σ are standard
-deviations of drawn errors; all others are constants. `range_check.mean_max_m` is 20 m, because the assumed orbits err by 5 m in radius.
-[*Wrong inputs*](wrong_inputs.md) lists mistakes of all sizes on one site with default limits; in the missions of
-[*Stated against true*](stated_against_true.md) many such errors occur together.
+Each row adds or enlarges one error in four missions of three sites, whose other errors have the sizes that areograph assumes. A test
+computes the table (`tests/truth/truth/unmodelled.rs`, in the long run) and writes this page. Sizes with σ are standard deviations of
+random errors; all others are constants. `range_check.mean_max_m` is 20 m, because the assumed orbits err by 5 m in radius. [*Wrong
+inputs*](wrong_inputs.md) lists mistakes of all sizes on one site with default limits; in the missions of [*Stated against
+true*](stated_against_true.md) many such errors occur together.
 
 *Invalid* counts the invalid sites. The other columns refer to the valid sites: the root mean square of the mean errors of the tie points of a
 site, with the ratio as in *Stated against true*; the ratios of the heights of single tie points, and of single footprints in plan.
@@ -373,7 +373,7 @@ Sites that are valid with remarks count as valid. *Answer*:
   make a site invalid.
 
 A drift of 0.08 mrad is eight times the standard deviation that areograph assumes. Tie points determine this drift. A correction of drift or bend
-by four to six standard deviations leads to a remark. A larger one makes the site invalid even if the result is correct, because no other check
+by four to six standard deviations causes a remark. A larger one makes the site invalid even if the result is correct, because no other check
 detects a wrong `CROSSTRACK_SUMMING` in both labels, which moves the ground by 707 m.
 
 | error | sites | invalid | height | east | north | single heights | footprints | answer |

@@ -217,7 +217,7 @@ fn frame_name(sensor: &str, turned_rad: f64) -> String {
         sensor.to_owned()
     } else {
         format!(
-            "{sensor} turned by {:.4} degrees about the boresight",
+            "{sensor} rotated by {:.4} degrees about the boresight",
             turned_rad.to_degrees()
         )
     }

@@ -100,7 +100,7 @@ pub enum Ended {
     #[error("ends after line {0}; expected {1}")]
     Early(usize, &'static str),
     /// Another kind of value.
-    #[error("line {line} holds {found:?}; expected {expected}")]
+    #[error("line {line} contains {found:?}; expected {expected}")]
     Value {
         /// Line of the file, counted from 1.
         line: usize,

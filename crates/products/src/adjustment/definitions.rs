@@ -28,8 +28,8 @@ pub(super) const DEFINITIONS: [(&str, &str); 16] = [
         "along_track",
         "the same with its sign, first minus second image, and its change with a rotation of each camera (range_m, metres \
          per radian), with its line times (line_time_m_s), and with one offset of the attitude clock of both (clock_m_s), metres per \
-         second: input of areograph compare-readings. Absent where the images were not flown in one direction, or are not apart \
-         across the track",
+         second: input of areograph compare-readings. Absent where the images were not flown in the same direction, or \
+         are not apart across the track",
     ),
     (
         "footprints",

@@ -47,7 +47,7 @@ pub(crate) static PROJECT: Declaration = Declaration {
     role: Role::Overview,
     content: Content::Foreign,
     write: Write::Where {
-        sites: "a site with an image whose edges see the ground",
+        sites: "a site with an image whose edges show the ground",
         has: has_outlines,
         write: |path, of| write(path, of).map(|()| 0),
     },
@@ -65,7 +65,7 @@ pub(crate) static OUTLINES: Declaration = Declaration {
     role: Role::Data,
     content: Content::Foreign,
     write: Write::Where {
-        sites: "a site with an image whose edges see the ground",
+        sites: "a site with an image whose edges show the ground",
         has: has_outlines,
         write: |path, of| {
             let outlines = vectors::outlines(of.site);

@@ -2,7 +2,7 @@
 
 Longitudes are east and latitudes areocentric, in degrees, in IAU 2000; lengths are in metres and times in TDB seconds
 past J2000 (ET). Names of columns end in their unit. Results carry their provenance in ``attrs["areograph"]``, Arrow
-tables in the schema metadata ``areograph``. Long calls release the interpreter and stop on Ctrl-C.
+tables in the schema metadata ``areograph``. Long calls release the global interpreter lock and stop on Ctrl-C.
 
 The command ``areograph`` of the same wheel is the program.
 """
@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 
 def _load_native() -> None:
-    # Other packages make the functions of their CSPICE global, as spiceypy does. Without this flag, calls of areograph
-    # would go there: they would read the kernels that others have loaded, and unload them.
+    # Other packages, such as spiceypy, export the symbols of their CSPICE to the whole process. Without this flag,
+    # calls from areograph would be bound to them, and would read and unload the kernels of these packages.
     flags = sys.getdlopenflags()
     sys.setdlopenflags(flags | getattr(os, "RTLD_DEEPBIND", 0))
     try:

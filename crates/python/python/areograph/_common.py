@@ -83,5 +83,5 @@ def provenance(**of: Any) -> dict[Any, Any]:
 
 
 def provenance_text(**of: Any) -> dict[Any, Any]:
-    """Return attributes of a dataset: as of `provenance`, as JSON, which NetCDF files hold."""
+    """Return attributes of a dataset: those of `provenance` as JSON, which NetCDF files can store."""
     return {name: json.dumps(value) for name, value in provenance(**of).items()}

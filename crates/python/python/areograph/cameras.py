@@ -46,14 +46,14 @@ def load(label: StrPath, kernels: Paths | None = None, *, format: str = "isd") -
     -------
     dict
         Support data as ``usgscsm`` reads them, the file ``isd.json`` of a run. They state the pointing bias and the
-        light-time convention; see the guide for the differences from ALE. The identifier is the product of the label.
+        light-time convention; see the guide for the differences from ALE. The identifier is the product identifier in the label.
 
     Raises
     ------
     CoverageError
         If the kernels do not cover the image.
     InvalidProducts
-        If the orientation is not valid, such as an attitude that is held over gaps of the kernels.
+        If the orientation is invalid, for example because an attitude is held over gaps in the kernels.
     """
     if format != "isd":
         raise UsageError(f"format is {format!r}; expected 'isd'")
@@ -99,7 +99,7 @@ def orientation(image: Image, kernels: Paths | None = None, *, step_lines: float
     image
         Support data or their file (``.json``); with ``kernels``, a label.
     kernels
-        As of `load`.
+        As for `load`.
     step_lines
         Lines between two poses; the last line is included.
 
@@ -155,8 +155,7 @@ def ground_to_image(
     -------
     line, sample, valid
         Lines and samples are 0 at the outer edge of the first line or sample. ``valid`` states whether the image shows
-        the point. A point that no line sees has NaN: behind the camera, on the far side of the body, or without a
-        position. Terrain in between is not examined.
+        the point. The result is NaN for a point that no line sees: behind the camera, on the far side of the body, or without a position. Occlusion by terrain is not examined.
     """
     points, shape = _broadcast(longitude_deg=longitude_deg, latitude_deg=latitude_deg, radius_m=radius_m)
     table = pyarrow.table(_camera(_support(image)).project(*points))
@@ -189,7 +188,7 @@ def image_to_ground(
     -------
     longitude_deg, latitude_deg, radius_m
         NaN where the position is outside the image, a ray meets no ground, or the iteration over ``surface`` does not
-        converge to 1 mm. Support data state no accuracy: for standard deviations use the products of an adjustment.
+        converge to 1 mm. Support data state no accuracy: for standard deviations, use the products of an adjustment.
     """
     (lines, samples), shape = _broadcast(line=line, sample=sample)
     camera, pixels = _camera(_support(image)), (lines, samples)

@@ -1,6 +1,7 @@
-"""Exceptions by kind of failure; the message states site, stage, file, value and what to do.
+"""Exceptions by kind of failure; the message states site, stage, file, value and advice.
 
-Every exception has the attributes ``exit_code`` (as of the command), ``site``, ``stage``, ``file`` and ``advice``.
+Every exception has the attributes ``exit_code`` (as for the command), ``site``, ``stage``, ``file`` and
+``advice``.
 """
 
 from ._native import (

@@ -90,8 +90,7 @@ def compare_kernels(
     xarray.Dataset
         ``position_m`` with dimensions ``set``, ``et`` and ``axis`` (radial, along-track, cross-track of the mean
         orbit); where the sets contain attitudes, ``attitude_arcsec`` with dimensions ``set``, ``et_attitude`` and
-        ``axis``. ``b`` minus ``a`` is twice the deviation of ``b``. Epochs are 1 s apart, or farther where there
-        would be more than 10,000. ``attrs["areograph"]``, JSON, contains the statistics.
+        ``axis``. ``b`` minus ``a`` is twice the deviation of ``b``. Epochs are 1 s apart, or farther apart if there would be more than 10,000. ``attrs["areograph"]``, JSON, contains the statistics.
 
     Raises
     ------
@@ -102,7 +101,7 @@ def compare_kernels(
     """
     xarray = optional("xarray")
     if (t0 is None) != (t1 is None):
-        raise UsageError("only one of t0 and t1 is given; expected both, or none")
+        raise UsageError("only one of t0 and t1 is given; expected both, or neither")
     utc = None if t0 is None else [utc_text(time) for time in (t0, t1)]
     if utc is not None and None in utc:
         raise UsageError(f"t0 and t1 are {t0!r} and {t1!r}; expected UTC as text or datetime")

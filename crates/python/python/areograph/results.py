@@ -263,8 +263,7 @@ class Result:
     def isd(self, image: str, *, adjusted: bool = False) -> dict[str, Any]:
         """Camera model of an image: image support data of the Community Sensor Model.
 
-        Positions have the light-time convention of the run; ``path("exchange/centre/IMAGE_isd.json")`` is the camera
-        model by the convention of ISIS and ALE.
+        Positions have the light-time convention of the run; ``path("exchange/centre/IMAGE_isd.json")`` is the camera model in the convention of ISIS and ALE.
 
         Parameters
         ----------

@@ -48,7 +48,7 @@ _OF_SEARCH = ("windows", "geometry")
 def read_pedr(
     path: Paths, *, orbits: int | Iterable[int] | None = None, columns: str | Sequence[str] | None = None
 ) -> pyarrow.Table:
-    """Read every shot with a return of PEDR files, of any class.
+    """Read every shot with a return from PEDR files, whatever its class.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def read_pedr(
     orbits
         Only shots of these orbits, as the files number them.
     columns
-        Names of columns, in the order of the result; by default all. Few columns are read faster.
+        Names of columns, in the order of the result; by default all. Fewer columns are read faster.
 
     Returns
     -------
@@ -74,7 +74,7 @@ def read_pedr(
     Warns
     -----
     UserWarning
-        If single records with errors are omitted with their shots.
+        If records with errors are omitted with their shots.
     """
     known = [name for name in _native.shot_columns() if name not in _OF_SEARCH]
     if isinstance(columns, str):
@@ -187,14 +187,12 @@ def tracks(
     Parameters
     ----------
     archive, aoi, t0, t1, leap_seconds
-        As of `search_shots`.
+        As for `search_shots`.
 
     Returns
     -------
     geopandas.GeoDataFrame
-        ``orbit``, ``shots``, ``et_start_s``, ``et_stop_s`` and ``geometry``: lines through the footprints, in parts where
-        more than 2 s lie between two shots, and at 180 degrees of longitude. A part of a single shot has no line;
-        profiles without any line have points.
+        ``orbit``, ``shots``, ``et_start_s``, ``et_stop_s`` and ``geometry``: lines through the footprints, divided where more than 2 s separate two shots, and at 180 degrees of longitude. A part with a single shot has no line; profiles without any line have points.
     """
     geopandas, shapely = optional("geopandas"), optional("shapely")
     names = ["et_tag_s", "orbit", "longitude_deg", "latitude_deg"]
@@ -238,7 +236,7 @@ def tracks(
 def check_ranges(
     shots: pyarrow.Table | DataFrame, kernels: Paths, *, clock_bias_s: float | None = None
 ) -> DataFrame:
-    """Compare measured ranges with the distances between footprints and the spacecraft of kernels.
+    """Compare measured ranges with the distances between footprints and the spacecraft positions in kernels.
 
     Parameters
     ----------
@@ -254,8 +252,7 @@ def check_ranges(
     -------
     pandas.DataFrame
         For every shot, with the index of ``shots``: ``distance_m``; ``range_minus_distance_m`` for the radius before, and
-        ``range_minus_distance_crossover_m`` for the radius after the crossover correction; ``decoding_m``, the same with
-        the spacecraft of the file; and the spacecraft of the file minus that of the kernels along the radial,
+        ``range_minus_distance_crossover_m`` for the radius after the crossover correction; ``decoding_m``, the same with the spacecraft position in the file; and the spacecraft position in the file minus that in the kernels along the radial,
         along-track and cross-track axes of the orbit. Metres.
 
     Raises
@@ -301,7 +298,7 @@ def _search(
     stated: dict[str, Any] = json.loads(statement)
     if not stated["complete"]:
         warnings.warn(
-            f"{stated['records_left_out']} records with errors are omitted with their shots; the first complaint: "
+            f"{stated['records_left_out']} records with errors are omitted with their shots; the first error: "
             f"{stated['first_complaints'][0]}",
             UserWarning,
             stacklevel=3,
@@ -334,7 +331,7 @@ def _windows(aoi: Area, folder: str) -> tuple[list[list[float]], list[str]]:
 
 
 def _require_polygons(shape: dict[str, Any]) -> None:
-    """Raise for a shape of GeoJSON with other geometries than polygons, or without any."""
+    """Raise an error for GeoJSON with geometries other than polygons, or with none."""
     if shape.get("type") == "FeatureCollection":
         geometries = [(feature.get("geometry") or {}).get("type") for feature in shape.get("features", [])]
     elif shape.get("type") == "Feature":

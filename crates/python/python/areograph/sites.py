@@ -42,9 +42,9 @@ class Check:
     """Configuration, inputs and coverage of a site, and the verdict of a run."""
 
     site: str
-    #: Whether no cause is known that would stop a run or make its products invalid.
+    #: Whether no known cause would stop a run or make its products invalid.
     ready: bool
-    #: Causes that would stop a run, or make its products invalid, with what to do.
+    #: Causes that would stop a run, or make its products invalid, with advice.
     failures: list[str]
     findings: list[str]
     #: The verdict, as in the manifest; None if a run would fail, or if the verdict was not computed.
@@ -69,12 +69,12 @@ def plan(site: StrPath, *, out: StrPath = "out") -> Plan:
 def check(site: StrPath, *, out: StrPath = "out", full: bool = False) -> Check:
     """Examine the configuration, the inputs and the kernel coverage of a site.
 
-    Failures are part of the result; only a configuration that cannot be read raises.
+    Failures are part of the result; only an unreadable configuration raises an exception.
 
     Parameters
     ----------
     site, out
-        As of `plan`. If the products in ``out`` are up to date, their verdict is returned.
+        As for `plan`. If the products in ``out`` are up to date, their verdict is returned.
     full
         Compute every stage for the verdict if the products are not up to date; no product is written.
     """
@@ -93,7 +93,7 @@ def run(site: StrPath, *, out: StrPath = "out", force: bool = False) -> Result:
     Parameters
     ----------
     site, out
-        As of `plan`; products go to a folder of the site in ``out``.
+        As for `plan`; products go to a folder of the site in ``out``.
     force
         Execute every stage.
 

@@ -87,7 +87,7 @@ impl Limits {
                 "m",
             ),
             beyond(
-                || format!("image {image}: the camera turned"),
+                || format!("image {image}: the camera rotated"),
                 movement.turn_arcsec.max,
                 arcseconds,
                 "arcsec",

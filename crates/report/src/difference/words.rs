@@ -389,7 +389,7 @@ fn image_sentence(image: &ImageDifference) -> String {
     });
     sentences.push(if movement.turn_arcsec.moved() {
         format!(
-            "turned by {} arcsec on average, up to {} (mean about x {}, y {}, z {})",
+            "rotated by {} arcsec on average, up to {} (mean about x {}, y {}, z {})",
             quantity(movement.turn_arcsec.mean),
             quantity(movement.turn_arcsec.max),
             quantity(movement.about_x_arcsec.mean),

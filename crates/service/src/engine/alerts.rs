@@ -29,6 +29,18 @@ pub struct Alert<'a> {
     pub text: &'a str,
 }
 
+impl<'a> Alert<'a> {
+    /// An alert that concerns no single site.
+    pub(super) const fn of_service(kind: AlertKind, text: &'a str) -> Self {
+        Self {
+            kind,
+            site: None,
+            run: None,
+            text,
+        }
+    }
+}
+
 /// Reports an alert: as an event, and by a notification to each hook that subscribes to this kind.
 ///
 /// # Errors
@@ -83,13 +95,13 @@ pub fn tell_waits(
     now_ms: i64,
 ) -> Stored<()> {
     let alert = |kind, text: &str, more: &Value| {
-        let alert = Alert {
-            kind,
-            site: None,
-            run: None,
-            text,
-        };
-        tell(transaction, config, now_ms, &alert, more)
+        tell(
+            transaction,
+            config,
+            now_ms,
+            &Alert::of_service(kind, text),
+            more,
+        )
     };
     let mut ended = alerted_waits(transaction)?;
     for wait in waits(transaction)? {

@@ -49,12 +49,7 @@ pub fn has_room<W: Workers>(core: &Core<W>) -> Stored<bool> {
         "{} has {left} MiB left, less than workers.min_free_mib = {least_mib}: no job starts",
         folder.display()
     );
-    let alert = Alert {
-        kind: AlertKind::DiskLow,
-        site: None,
-        run: None,
-        text: &text,
-    };
+    let alert = Alert::of_service(AlertKind::DiskLow, &text);
     let now_ms = core.now_ms();
     core.shared.write(|transaction| {
         tell_edge(transaction, &config, now_ms, ("disk", low), (&alert, None))

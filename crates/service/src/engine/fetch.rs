@@ -71,20 +71,14 @@ async fn fetch<W: Workers>(core: &Core<W>) -> Stored<()> {
         let data = json!({ "sites": fetched, "failures": failures });
         append(transaction, now_ms, "fetch", About::default(), &data)?;
         let text = format!("archive files were not fetched: {}", failures.join("; "));
-        let alert = |kind, text| Alert {
-            kind,
-            site: None,
-            run: None,
-            text,
-        };
         tell_edge(
             transaction,
             &config,
             now_ms,
             ("fetch", !failures.is_empty()),
             (
-                &alert(AlertKind::FetchFailed, &text),
-                Some(&alert(
+                &Alert::of_service(AlertKind::FetchFailed, &text),
+                Some(&Alert::of_service(
                     AlertKind::Recovered,
                     "archive files are being fetched again",
                 )),

@@ -142,12 +142,7 @@ pub fn end_done<W: Workers>(core: &Core<W>, night: i64) -> Stored<Option<Night>>
             "failures": night.failures,
         });
         append(transaction, now_ms, "night", About::default(), &summary)?;
-        let alert = Alert {
-            kind: AlertKind::NightComplete,
-            site: None,
-            run: None,
-            text: &text,
-        };
+        let alert = Alert::of_service(AlertKind::NightComplete, &text);
         tell(transaction, &config, now_ms, &alert, &summary)?;
         Ok(Some(night))
     })

@@ -213,12 +213,6 @@ fn tell_root(
 ) -> Stored<()> {
     let gone = format!("{} is not available: {}", root.path, root.detail);
     let back = format!("{} is available again", root.path);
-    let alert = |kind, text| Alert {
-        kind,
-        site: None,
-        run: None,
-        text,
-    };
     tell_edge(
         transaction,
         config,
@@ -228,8 +222,8 @@ fn tell_root(
             root.state == RootState::Unavailable,
         ),
         (
-            &alert(AlertKind::RootUnavailable, &gone),
-            Some(&alert(AlertKind::RootBack, &back)),
+            &Alert::of_service(AlertKind::RootUnavailable, &gone),
+            Some(&Alert::of_service(AlertKind::RootBack, &back)),
         ),
     )
 }

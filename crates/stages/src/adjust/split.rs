@@ -35,7 +35,7 @@ const BOTH_ABOVE_M: f64 = 100.0;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct OtherReading {
     /// Offset of the attitude clock with its standard deviation, seconds, where this reading uses it; otherwise all
-    /// images are taken as equally likely to be wrong.
+    /// images are treated as equally likely to be in error.
     pub attitude_clock_s: Option<(f64, f64)>,
     /// Mean of the tie points by this reading minus their mean by the adjustment, towards east, north and up, metres.
     pub moved_m: [f64; 3],

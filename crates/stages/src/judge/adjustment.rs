@@ -329,8 +329,8 @@ impl AdjustmentEvidence<'_> {
                 "positions depend on adjustment.readings: {pairs} {supports} independent errors of single images (odds 10^{odds:.1} to 1)"
             ),
             None => format!(
-                "positions depend on adjustment.readings: {pairs} {decides} the cause of along-track disagreements, so that all images \
-                 are taken as equally likely to be in error"
+                "positions depend on adjustment.readings: {pairs} {decides} the cause of along-track disagreements, \
+                 and all images are treated as equally likely to be in error"
             ),
         })
     }

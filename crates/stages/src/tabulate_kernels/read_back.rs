@@ -17,7 +17,7 @@ const POSITION_TOLERANCE_M: f64 = 1e-3;
 /// ticks are rounded.
 const ROTATION_TOLERANCE_RAD: f64 = 1e-9;
 
-/// Makes sure that `session`, with the original kernels and a pair of the image, gives every sample of `orientation` to
+/// Ensures that `session`, with the original kernels and a pair of the image, gives every sample of `orientation` to
 /// readers that compute cameras by `reading`.
 ///
 /// # Errors

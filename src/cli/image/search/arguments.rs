@@ -18,11 +18,13 @@ const ANGLE_MAX_DEG: f64 = 180.0;
 /// Wider than Mars, and therefore than any pixel.
 const PIXEL_MAX_M: f64 = 1e7;
 
-/// Finds the images of the mission's cumulative index that may show ground of a window, and pairs of them.
+/// Finds the images of the mission's cumulative index that may show ground in a window, and pairs of these
+/// images.
 ///
 /// An image is listed if its outline meets a window within the uncertainty of the index: 0.35 degrees of latitude
-/// (areographic or areocentric), 0.3 degrees of longitude over cos(latitude) (prime meridian). The search therefore loses
-/// no image, and also finds images just outside a window; `areograph run` determines the ground that an image shows.
+/// (areographic or areocentric), 0.3 degrees of longitude over cos(latitude) (prime meridian). The search therefore
+/// misses no image, and also finds images just outside a window; `areograph run` determines the ground that an image
+/// shows.
 ///
 /// Pairs are images of different orbits (by the index, else by times more than 30 minutes apart) with common ground. Best
 /// first: overlap × min(convergence / 20°, 1) × cos²(difference of the Sun / 2) / ratio of the pixels. Convergence is the
@@ -60,7 +62,7 @@ pub(in crate::cli::image) struct Arguments {
     /// Format of the printed answer.
     #[arg(long, value_enum, default_value = "table")]
     pub(super) format: Format,
-    /// Print JSON, as --format geojson.
+    /// Print JSON, like --format geojson.
     #[arg(long, conflicts_with = "format")]
     pub(super) json: bool,
 }

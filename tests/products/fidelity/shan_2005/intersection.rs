@@ -145,7 +145,7 @@ fn remarks() -> Vec<Comparison> {
     ]
 }
 
-const FROM: &str = "circular orbits, emission angles of table 2 at the ground, a line's noise, clocks off by the printed means";
+const FROM: &str = "circular orbits, emission angles of table 2 at the ground, noise of one line, clock errors that cause the published means";
 
 pub(super) static ROWS: [Row; 5] = [
     Row {
@@ -157,9 +157,9 @@ pub(super) static ROWS: [Row; 5] = [
             from: FROM,
             ours: || table(0),
         },
-        note: "The size of the disagreement is a closed loop; its division between the images and its part across \
-               the track follow from the geometry. σ x comes from kernels of two phases. Our y has the opposite \
-               direction and is reversed here.",
+        note: "The size of the disagreement is a closed loop; its distribution between the images and its across-track \
+               part follow from the geometry. σ x results from kernels of two phases. In areograph, y has the opposite \
+               direction; it is reversed here.",
     },
     Row {
         id: "S05-50",
@@ -170,8 +170,8 @@ pub(super) static ROWS: [Row; 5] = [
             from: FROM,
             ours: || table(1),
         },
-        note: "As S05-49. With weights in focal-plane pixels image 2 takes more than half; the print has the \
-               reverse (S05-52).",
+        note: "As for S05-49. With weights in focal-plane pixels, image 2 receives more than half; in the paper, it \
+               receives less (S05-52).",
     },
     Row {
         id: "S05-51",
@@ -182,31 +182,31 @@ pub(super) static ROWS: [Row; 5] = [
             from: FROM,
             ours: || table(2),
         },
-        note: "As S05-49. Image 1 is the image off nadir.",
+        note: "As for S05-49. Image 1 is the off-nadir image.",
     },
     Row {
         id: "S05-52",
         kind: Kind::Arithmetic,
         place: "table 5",
-        what: "how the images share the disagreement, |M x1 / M x2|",
+        what: "distribution of the disagreement between the images, |M x1 / M x2|",
         account: Account::Explained {
-            from: "(pixel 1 / pixel 2)² · line spacing 2 / line spacing 1, pixels on the ground; for the law without ranges sums in \
-                   place of pixels",
+            from: "(pixel 1 / pixel 2)² · line spacing 2 / line spacing 1, pixels on the ground; for the law without \
+                   ranges, summing factors instead of pixels",
             ours: sharing,
         },
-        note: "The print follows a law that ignores the slant range; only this page computes it. areograph weights \
-               in focal-plane pixels, whose size on the ground depends on the range; no value of \
-               `intersection.weighting` gives the print.",
+        note: "The published values follow a law that ignores the slant range; only this page computes it. areograph \
+               uses weights in focal-plane pixels, whose size on the ground depends on the range; no value of \
+               `intersection.weighting` reproduces the published values.",
     },
     Row {
         id: "S05-53",
         kind: Kind::Arithmetic,
         place: "text on table 5",
-        what: "x up to 51 px, y about 4 px; σ x below 1 px but for Eos, 17 and 10",
+        what: "x up to 51 px, y about 4 px; σ x below 1 px, except 17 and 10 at Eos",
         account: Account::Agrees {
             from: "M + σ of table 5",
             ours: remarks,
         },
-        note: "The print is a sum, not a root of squares.",
+        note: "The published value is a sum, not the root of a sum of squares.",
     },
 ];

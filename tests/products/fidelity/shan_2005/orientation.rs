@@ -188,7 +188,7 @@ fn orders_of_angles() -> Vec<Comparison> {
     let each = ORDERS.map(|axes| {
         let [a, b, c] = axes;
         let ours = number(
-            format!("axes {a}-{b}-{c}, forced at most, ″"),
+            format!("axes {a}-{b}-{c}, residual due to the order, at most, ″"),
             largest_printed.to_string(),
             forced(axes.map(|axis| axis - 1)),
             2,
@@ -284,7 +284,7 @@ pub(super) static ROWS: [Row; 11] = [
             from: "circular orbit over the site, 31 samples, sum of squares over 31",
             ours: || sound(0, [TWO_PERCENT, TWO_PERCENT, TWO_PERCENT, ONE_PERCENT]),
         },
-        note: "Of the second order, three printed digits leave 4 % of the length. For pointing see S05-32.",
+        note: "For the second order, rounding to three published digits leaves an uncertainty of 4 % in the length. For pointing, see S05-32.",
     },
     Row {
         id: "S05-32",
@@ -296,10 +296,10 @@ pub(super) static ROWS: [Row; 11] = [
                    line",
             ours: orders_of_angles,
         },
-        note: "The table of Shan, Lee & Yoon 2002 has its angles in order 3-2-1, which would force 92″ on E02-02016 \
-               where 3.2″ are printed. The order is not stated; 1-2-3, 2-1-3 and 3-2-1 are excluded, with ω, φ, κ \
-               about X, Y, Z only 2-3-1 and 3-1-2 remain. Pointing in this table is jitter of the attitude in angles \
-               that are not known: sizes only.",
+        note: "The angles in the table of Shan, Lee & Yoon 2002 have the order 3-2-1, which would cause residuals of \
+               92″ for E02-02016, where 3.2″ is published. The order is not stated: 1-2-3, 2-1-3 and 3-2-1 are \
+               excluded; with ω, φ, κ about X, Y, Z, only 2-3-1 and 3-1-2 remain. Pointing in this table is attitude \
+               jitter in unknown angles, so only sizes can be compared.",
     },
     Row {
         id: "S05-33",
@@ -307,11 +307,12 @@ pub(super) static ROWS: [Row; 11] = [
         place: "table 4",
         what: "RMSE of E04-01275",
         account: Account::InPart {
-            from: "as S05-31, 8064 lines",
+            from: "as for S05-31, 8064 lines",
             ours: e04_01275,
         },
-        note: "This row determines the number of lines: the 7424 of table 2 give 9.7 m where 11.4 m follow from the \
-               print. Hence the length is no evidence; its division between X, Y and Z is.",
+        note: "This row determines the number of lines: the 7424 lines of table 2 give 9.7 m, whereas 11.4 m follows \
+               from the published values. The length is therefore not evidence, but its distribution among X, Y and Z \
+               is.",
     },
     Row {
         id: "S05-34",
@@ -319,7 +320,7 @@ pub(super) static ROWS: [Row; 11] = [
         place: "table 4",
         what: "RMSE of E02-00665",
         account: Account::InPart {
-            from: "as S05-31, the header's 10496 lines",
+            from: "as for S05-31, the header's 10496 lines",
             ours: || sound(2, [SHOWN, HALF_A_METRE, SHOWN, ONE_PERCENT]),
         },
         note: "Pointing: S05-32.",
@@ -344,7 +345,7 @@ pub(super) static ROWS: [Row; 11] = [
             from: "as S05-31",
             ours: || isidis(4),
         },
-        note: "The trajectory that the paper used has a defect: orbital dynamics leave 4 mm of a parabola, not 2.3 \
+        note: "The trajectory used in the paper has a defect: orbital motion departs from a parabola by 4 mm, not 2.3 \
                m. The second order does not improve φ.",
     },
     Row {
@@ -356,7 +357,7 @@ pub(super) static ROWS: [Row; 11] = [
             from: "as S05-31",
             ours: || isidis(5),
         },
-        note: "As S05-36: orbital dynamics leave 15 mm.",
+        note: "As for S05-36: orbital motion departs from a parabola by 15 mm.",
     },
     Row {
         id: "S05-38",
@@ -368,18 +369,18 @@ pub(super) static ROWS: [Row; 11] = [
             ours: sampling,
             test: "tests/commands/mission.rs::orientation_comes_back",
         },
-        note: "These are 31 instants, with both ends.",
+        note: "These are 31 instants, including both ends.",
     },
     Row {
         id: "S05-39",
         kind: Kind::Arithmetic,
         place: "text on table 4",
-        what: "up to 29 m and 7″; then millimetres and at most 5″",
+        what: "first order: up to 29 m and 7″; second order: millimetres and at most 5″",
         account: Account::Explained {
             from: "the rows of table 4",
             ours: remarks,
         },
-        note: "Second order leaves up to 51 mm at Eos and Gusev, and 2.3 m at Isidis.",
+        note: "Second-order residuals reach 51 mm at Eos and Gusev, and 2.3 m at Isidis.",
     },
     Row {
         id: "S05-40",
@@ -396,11 +397,11 @@ pub(super) static ROWS: [Row; 11] = [
         id: "S05-41",
         kind: Kind::Arithmetic,
         place: "text on table 4",
-        what: "gain in pointing by the second order",
+        what: "improvement of pointing by the second order",
         account: Account::Explained {
             from: "the rows of table 4, length of ω, φ, κ",
             ours: gain,
         },
-        note: "Two of six images gain 30–40 %; single angles gain 0 to 72 %.",
+        note: "Two of six images improve by 30–40 %; single angles improve by 0 to 72 %.",
     },
 ];

@@ -28,8 +28,8 @@ fn registration_uncertainty() -> Vec<Comparison> {
     vec![
         number("mean MOLA GSD of table 2, m", "325", mean_m, 2).within(3.0),
         derived(
-            "clock error of that size, s",
-            "not printed",
+            "equivalent clock error, s",
+            "not published",
             325.0 / ground_speed_m_s(true),
             3,
         )
@@ -159,13 +159,13 @@ pub(super) static ROWS: [Row; 16] = [
         id: "S05-01",
         kind: Kind::Arithmetic,
         place: "abstract, results, conclusions",
-        what: "uncertainty of registration along the flight: one MOLA GSD, near constant in an image",
+        what: "along-track uncertainty of the registration: one MOLA GSD, nearly constant within an image",
         account: Account::Agrees {
             from: "MOLA GSD of table 2; ground speed of a circular orbit",
             ours: registration_uncertainty,
         },
-        note: "The printed 325 m are a rounded mean. As an error of a clock they would be 0.107 s; the 0.117 s of \
-               the data preparation (S05-15) are the bias of MOLA's own clock, another quantity.",
+        note: "The published 325 m is a rounded mean. As a clock error, it corresponds to 0.107 s; the 0.117 s of the \
+               data preparation (S05-15) is the bias of MOLA's own clock, a different quantity.",
     },
     Row {
         id: "S05-02",
@@ -176,8 +176,8 @@ pub(super) static ROWS: [Row; 16] = [
             from: "the circular orbit of the rows below",
             ours: orbit,
         },
-        note: "370 km is the least altitude, near the south pole; over the three sites MGS is 380 to 385 km high (S05-69). \
-               The inclination by real kernels is 92.896°.",
+        note: "370 km is the lowest altitude, near the south pole; over the three sites, MGS is at 380 to 385 km \
+               (S05-69). The inclination according to real kernels is 92.896°.",
     },
     Row {
         id: "S05-03",
@@ -188,7 +188,7 @@ pub(super) static ROWS: [Row; 16] = [
             from: "2π√(a³/GM)",
             ours: period,
         },
-        note: "The print is truncated, not rounded.",
+        note: "The published value is truncated, not rounded.",
     },
     Row {
         id: "S05-04",
@@ -207,7 +207,7 @@ pub(super) static ROWS: [Row; 16] = [
         place: "table 1",
         what: "revisit",
         account: Account::Agrees {
-            from: "revolutions of 7064 s in 7 sols of 88 775.244 s, to a whole number",
+            from: "revolutions of 7064 s in 7 sols of 88 775.244 s, rounded to a whole number",
             ours: revisit,
         },
         note: "These are 88 revolutions.",
@@ -244,7 +244,7 @@ pub(super) static ROWS: [Row; 16] = [
             from: "config/instruments/moc_wa_red.toml and moc_wa_blue.toml, 370 km",
             ours: wide_angle,
         },
-        note: "The paper does not use this camera. The files contain the focal lengths that belong to the \
+        note: "The paper does not use this camera. The instrument files contain the focal lengths that belong to the \
                distortion of each camera, 11.2 and 10.9 mm; 280 m would require an altitude of 450 km.",
     },
     Row {
@@ -268,7 +268,7 @@ pub(super) static ROWS: [Row; 16] = [
             from: "0.4 mrad and 370 km of the same table",
             ours: laser_spot,
         },
-        note: "130 m correspond to 0.35 mrad.",
+        note: "130 m corresponds to 0.35 mrad.",
     },
     Row {
         id: "S05-11",
@@ -276,10 +276,10 @@ pub(super) static ROWS: [Row; 16] = [
         place: "table 1",
         what: "range resolution",
         account: Account::Agrees {
-            from: "half the way of light in 2.5 ns",
+            from: "half the distance that light travels in 2.5 ns",
             ours: range_resolution,
         },
-        note: "2.5 ns is the step of MOLA's 400 MHz counter; the paper does not print it.",
+        note: "2.5 ns is the resolution of MOLA's 400 MHz counter; the paper does not state it.",
     },
     Row {
         id: "S05-12",
@@ -290,7 +290,7 @@ pub(super) static ROWS: [Row; 16] = [
             from: "ground speed of a circular orbit, 0.1 s",
             ours: along_track,
         },
-        note: "330 m are neither of the two spacings of table 2, nor those of real shots (S05-65).",
+        note: "330 m is neither one of the two spacings in table 2 nor a spacing of real shots (S05-65).",
     },
     Row {
         id: "S05-13",
@@ -307,7 +307,7 @@ pub(super) static ROWS: [Row; 16] = [
         id: "S05-14",
         kind: Kind::Constants,
         place: "data preparation",
-        what: "shift of attitude look-ups, pointing only",
+        what: "time offset of attitude look-ups, for pointing only",
         account: Account::Input {
             from: "config/instruments/moc_na.toml",
             ours: attitude_bias,
@@ -325,7 +325,7 @@ pub(super) static ROWS: [Row; 16] = [
             ours: clock_bias,
             test: "tests/commands/mission.rs::the_three_readings_of_the_clock_bias_differ_as_told",
         },
-        note: "Neither sign nor formula is printed. Three readings are scopes of `altimeter_clock.scope`: `spk_lookup` \
+        note: "Neither sign nor formula is published. The key `altimeter_clock.scope` offers three readings: `spk_lookup` \
                (default), `both`, `rotation`.",
     },
     Row {
@@ -336,7 +336,7 @@ pub(super) static ROWS: [Row; 16] = [
         account: Account::Data {
             printed: "0–50 m apart, mostly across the track; NAV nearest to the mean",
         },
-        note: "Closed loop: orbits that a synthetic mission shifts come back to the metre, and the one nearest to \
-               their mean is chosen (tests/commands/compare_kernels.rs).",
+        note: "Closed loop: the shifts of synthetic orbits are recovered to a metre, and the orbit nearest to their \
+               mean is chosen (tests/commands/compare_kernels.rs).",
     },
 ];

@@ -63,8 +63,8 @@ pub(super) static ROWS: [Row; 3] = [
             printed: "E02-02855: 174, 0.637, 0.015; E04-01275: 76, −9.889, 0.739; E02-00665: 142, −2.044, 0.019; \
                       E02-01453: 124, −4.029, 0.299; E02-01301: 71, −25.359, 1.077; E02-02016: 107, −1.435, 0.635",
         },
-        note: "Closed loop: an orbit that a synthetic mission shifts comes back as the mean of its ranges \
-               (tests/commands/mission.rs::profile_means_are_the_injected_orbit_differences). The paper has no \
+        note: "Closed loop: the shift of a synthetic orbit is recovered as the mean of the range residuals \
+               (tests/commands/mission.rs::profile_means_are_the_injected_orbit_differences). The paper states no \
                limit; E02-01301 would exceed a limit of 10 m.",
     },
     Row {
@@ -76,7 +76,7 @@ pub(super) static ROWS: [Row; 3] = [
             from: "the rows of table 3",
             ours: remarks,
         },
-        note: "The paper prints observations, not limits. Three of six means are below 4 m.",
+        note: "The paper publishes observations, not limits. Three of six means are below 4 m.",
     },
     Row {
         id: "S05-30",
@@ -87,6 +87,6 @@ pub(super) static ROWS: [Row; 3] = [
             from: "the rows of table 3",
             ours: conclusions,
         },
-        note: "The printed 5 m are the largest single shot, not a mean.",
+        note: "The published 5 m is the largest residual of a single shot, not a mean.",
     },
 ];

@@ -70,8 +70,8 @@ fn spacing() -> Vec<Comparison> {
             1,
         )
         .within(0.5),
-        derived("305 m over the printed 5.5 m", "55", 305.0 / 5.5, 1).shown(),
-        derived("340 m over the printed 3.3 m", "104", 340.0 / 3.3, 1).shown(),
+        derived("305 m over the published 5.5 m", "55", 305.0 / 5.5, 1).shown(),
+        derived("340 m over the published 3.3 m", "104", 340.0 / 3.3, 1).shown(),
     ]
 }
 
@@ -125,8 +125,8 @@ pub(super) static ROWS: [Row; 7] = [
             from: "circular orbit, both images, 174 points at 305 m",
             ours: eos,
         },
-        note: "The off-nadir image alone needs 2.9. The paper does not state whether the sum was divided by 174 or \
-               348. Eq. 4 needs fewer iterations in each image.",
+        note: "The off-nadir image alone requires 2.9. The paper does not state whether the sum was divided by 174 or \
+               348. Eq. 4 requires fewer iterations in each image.",
     },
     Row {
         id: "S05-44",
@@ -137,8 +137,8 @@ pub(super) static ROWS: [Row; 7] = [
             from: "circular orbit, nadir, 142 points at 305 m",
             ours: gusev,
         },
-        note: "The row is of one image, not of a pair. Frame first needs 11 % more iterations than printed; the \
-               paper does not state its start values.",
+        note: "The row refers to one image, not to a pair. The frame-first method requires 11 % more iterations than \
+               published; the paper does not state its initial values.",
     },
     Row {
         id: "S05-45",
@@ -146,10 +146,10 @@ pub(super) static ROWS: [Row; 7] = [
         place: "registration",
         what: "eq. 4 is 3–4 times faster",
         account: Account::Explained {
-            from: "the printed counts of both sites",
+            from: "the published counts of both sites",
             ours: gain,
         },
-        note: "At Eos the ratio is 4.7.",
+        note: "At Eos, the ratio is 4.7.",
     },
     Row {
         id: "S05-46",
@@ -160,29 +160,29 @@ pub(super) static ROWS: [Row; 7] = [
             from: "exposure time and ground speed",
             ours: spacing,
         },
-        note: "By the exposure times the pixels are 5.51 and 3.27 m, which the paper prints as 5.5 and 3.3 m.",
+        note: "According to the exposure times, the pixels are 5.51 and 3.27 m, which the paper rounds to 5.5 and 3.3 m.",
     },
     Row {
         id: "S05-47",
         kind: Kind::ClosedLoop,
         place: "results",
-        what: "point 74 of ap19215 left where 73 is right; 109 and 108 of ap18933",
+        what: "point 74 of ap19215 in the left image at the position of point 73 in the right image; 109 and 108 of ap18933",
         account: Account::Agrees {
-            from: "circular orbit, E02-00665, a clock error of the time between two shots",
+            from: "circular orbit, E02-00665, a clock error equal to the time between two shots",
             ours: same_place,
         },
-        note: "An inserted shift of time comes back as one footprint. The paper compared the images by eye.",
+        note: "An inserted time shift is recovered as one footprint. The paper compared the images visually.",
     },
     Row {
         id: "S05-48",
         kind: Kind::Constants,
         place: "intersection",
-        what: "about 24 seed points a pair, measured to better than 2 px",
+        what: "about 24 seed points per pair, measured to better than 2 px",
         account: Account::Input {
             from: "default of `adjustment.tie_sigma_px`",
             ours: measuring,
             test: "tests/stages/stereo_intersection.rs::noise_comes_out_as_simulated_and_as_the_covariance_says",
         },
-        note: "areograph reads tie points, and measures them where pixels are given (`ties.match`); it needs no seeds.",
+        note: "areograph reads tie points, and measures them where pixels are given (`ties.match`); it requires no seed points.",
     },
 ];

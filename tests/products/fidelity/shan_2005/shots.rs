@@ -55,7 +55,7 @@ fn orbits() -> Vec<Comparison> {
         all.push(
             derived(
                 format!("{}, from its end to the first shot, s", image.id),
-                "not printed",
+                "not published",
                 pass.after_s,
                 1,
             )
@@ -90,7 +90,7 @@ fn accuracy() -> Vec<Comparison> {
     let windows = real_shots::smooth_windows();
     let each = windows.map(|(name, crossings, sigma_m)| {
         number(
-            format!("{name}, 1 σ of a shot by {crossings} crossings, m"),
+            format!("{name}, 1 σ of a shot from {crossings} crossings, m"),
             "1",
             sigma_m,
             2,
@@ -118,10 +118,10 @@ pub(super) static ROWS: [Row; 7] = [
         place: "table 2",
         what: "MOLA GSD of the pair at Gusev, m",
         account: Account::Agrees {
-            from: "distances of real shots of both passes, just after the images",
+            from: "distances between real shots of both passes, just after the images",
             ours: spacing,
         },
-        note: "The spacing changes by 2 m with height and latitude. The 330 m of table 1 are neither of the two spacings (S05-12).",
+        note: "The spacing varies by 2 m with height and latitude. The 330 m of table 1 is neither of the two spacings (S05-12).",
     },
     Row {
         id: "S05-66",
@@ -129,10 +129,10 @@ pub(super) static ROWS: [Row; 7] = [
         place: "table 2",
         what: "MOLA profiles of the pair at Gusev, and days between them",
         account: Account::Explained {
-            from: "orbits and times of the real passes next to the images in time",
+            from: "orbits and times of the real passes closest in time to the images",
             ours: orbits,
         },
-        note: "The paper prints the names of files: a file is named after the first of its twelve orbits, and the passes are \
+        note: "The paper states file names: a file is named after the first of its twelve orbits, and the passes are \
                among these. The window of the shots begins after the end of the images.",
     },
     Row {
@@ -141,10 +141,10 @@ pub(super) static ROWS: [Row; 7] = [
         place: "table 1",
         what: "period",
         account: Account::Agrees {
-            from: "time between both real passes over the number of orbits",
+            from: "time between the two real passes divided by the number of orbits",
             ours: period,
         },
-        note: "The print is truncated, not rounded.",
+        note: "The published value is truncated, not rounded.",
     },
     Row {
         id: "S05-68",
@@ -179,6 +179,6 @@ pub(super) static ROWS: [Row; 7] = [
             ours: accuracy,
         },
         note: "This is repeatability after the crossover adjustment of the MOLA team; it does not contain an error that all \
-               passes share. Heights do not determine the 100 m in plan.",
+               passes share. Heights do not test the 100 m in plan.",
     },
 ];

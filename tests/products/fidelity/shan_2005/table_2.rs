@@ -170,8 +170,8 @@ pub(super) static ROWS: [Row; 11] = [
             ours: emission,
             test: "tests/truth/scene_mission.rs::the_images_are_flown_as_table_2_prints_them",
         },
-        note: "By the text of the paper the angle is at the camera, by the use of the archive at the ground; only \
-               the latter gives the printed base of 155 km (S05-60).",
+        note: "According to the text of the paper, the angle is measured at the camera; in the archive, it is measured \
+               at the ground. Only the latter agrees with the published base of 155 km (S05-60).",
     },
     Row {
         id: "S05-18",
@@ -191,11 +191,11 @@ pub(super) static ROWS: [Row; 11] = [
         place: "table 2",
         what: "exposure time, ms",
         account: Account::Input {
-            from: "exposure of a detector line times the sum factor",
+            from: "exposure of a detector line times the summing factor",
             ours: exposure,
             test: "crates/scene/src/plan.rs::line_periods_are_those_of_table_2",
         },
-        note: "This is the period of a summed line: its product with the ground speed is the printed pixel size \
+        note: "This is the period of a summed line: multiplied by the ground speed, it gives the published pixel size \
                (S05-23).",
     },
     Row {
@@ -220,8 +220,8 @@ pub(super) static ROWS: [Row; 11] = [
             ours: header_lines,
             test: "tests/truth/scene_mission.rs::the_images_are_flown_as_table_2_prints_them",
         },
-        note: "The paper contradicts itself: its table 4 requires 8064 lines of E04-01275 (S05-33). The synthetic \
-               image has 8064 lines, of which the printed 7424 are delivered.",
+        note: "The paper contradicts itself: its table 4 requires 8064 lines for E04-01275 (S05-33). The synthetic \
+               image has 8064 lines, of which the published 7424 are delivered.",
     },
     Row {
         id: "S05-22",
@@ -229,7 +229,7 @@ pub(super) static ROWS: [Row; 11] = [
         place: "table 2",
         what: "lines and samples of the file",
         account: Account::Input {
-            from: "the synthetic mission; samples are 2048 over the sum factor, down to a multiple of 16",
+            from: "the synthetic mission; samples are 2048 divided by the summing factor, rounded down to a multiple of 16",
             ours: file_size,
             test: "tests/truth/scene_mission.rs::the_images_are_flown_as_table_2_prints_them",
         },
@@ -241,10 +241,10 @@ pub(super) static ROWS: [Row; 11] = [
         place: "table 2",
         what: "MOC GSD, m",
         account: Account::Agrees {
-            from: "exposure time, ground speed of nadir images and of those held inertially",
+            from: "exposure time, ground speeds of nadir and of inertially held images",
             ours: pixel_size,
         },
-        note: "The size is along the track only.",
+        note: "The published size applies along the track only.",
     },
     Row {
         id: "S05-24",
@@ -266,7 +266,7 @@ pub(super) static ROWS: [Row; 11] = [
             from: "10 Hz times the imaging time",
             ours: shots,
         },
-        note: "Every image has fewer shots than fit in its time: some are missing. Their number needs data.",
+        note: "Every image has fewer shots than its imaging time permits: some are missing. Their number requires data.",
     },
     Row {
         id: "S05-26",
@@ -274,7 +274,7 @@ pub(super) static ROWS: [Row; 11] = [
         place: "table 2",
         what: "MOLA GSD, m",
         account: Account::Agrees {
-            from: "0.1 s, ground speed of nadir images and of those held inertially",
+            from: "0.1 s, ground speeds of nadir and of inertially held images",
             ours: shot_spacing,
         },
         note: "",
@@ -283,7 +283,7 @@ pub(super) static ROWS: [Row; 11] = [
         id: "S05-27",
         kind: Kind::Arithmetic,
         place: "text on table 2",
-        what: "imaging time about 12 s; pairs less than 10 days apart but for Eos",
+        what: "imaging time about 12 s; pairs less than 10 days apart, except Eos",
         account: Account::Agrees {
             from: "lines and times of table 2",
             ours: durations,

@@ -50,14 +50,14 @@ fn along() -> Vec<Comparison> {
         number("px", "41.0", budget.along_px, 3).between(40.982, 40.992),
         derived(
             "by eq. 5, means alone, px",
-            "not printed",
+            "not published",
             means_apart_px(),
             1,
         )
         .shown(),
         derived(
             "by eq. 5, with the standard deviations, px",
-            "not printed",
+            "not published",
             budget.equation_5.along_px,
             1,
         )
@@ -85,7 +85,7 @@ fn ground() -> Vec<Comparison> {
         number("unrounded, px", "61.6", along_px, 2).shown(),
         derived(
             "with the means by eq. 5, px",
-            "not printed",
+            "not published",
             (total_px(&budget).round().powi(2) - means_apart_px().powi(2)).sqrt(),
             1,
         )
@@ -136,7 +136,7 @@ fn plan() -> Vec<Comparison> {
         .shown(),
         derived(
             "by eq. 5, m",
-            "not printed",
+            "not published",
             budget.equation_5.point.planimetric_m,
             1,
         )
@@ -156,13 +156,13 @@ fn height_and_base() -> Vec<Comparison> {
     let table = shan_2002::base_and_height();
     vec![
         number(
-            "H by the table of 2002, km",
+            "H from the table of 2002, km",
             "385",
             table.altitude_m / 1e3,
             1,
         )
         .share(0.02),
-        number("B by the table of 2002, km", "155", table.base_m / 1e3, 1).share(0.02),
+        number("B from the table of 2002, km", "155", table.base_m / 1e3, 1).share(0.02),
     ]
 }
 
@@ -171,7 +171,7 @@ fn height_over_base() -> Vec<Comparison> {
     vec![
         number("385/155", "2.5", 385.0 / 155.0, 3).within(0.02),
         number(
-            "by the table of 2002",
+            "from the table of 2002",
             "2.5",
             table.altitude_m / table.base_m,
             3,
@@ -197,7 +197,7 @@ fn height() -> Vec<Comparison> {
         number("by eq. 7 across, m", "30.8", budget.equation_7.height_m, 2).shown(),
         derived(
             "by eq. 5 across, m",
-            "not printed",
+            "not published",
             budget.equation_5.point.height_m,
             1,
         )
@@ -215,8 +215,9 @@ pub(super) static ROWS: [Row; 10] = [
             from: "table 5: squares averaged over the sites for each image, then added",
             ours: along,
         },
-        note: "Averages of D instead of its square give 40.7. Eq. 7 adds the means of both images in quadrature. By the paper's own \
-               eq. 5, Δx = Δx1 − Δx2, means of opposite sign add up: 54.3, 49.8 and 59.8 px. This changes the conclusions that \
+        note: "Averaging D instead of its square gives 40.7. Eq. 7 adds the means of both images in quadrature. \
+               According to the paper's own eq. 5, Δx = Δx1 − Δx2, means of opposite sign add up: 54.3, 49.8 and 59.8 \
+               px. This changes the conclusions that \
                follow (S05-56, S05-58, S05-62).",
     },
     Row {
@@ -239,9 +240,9 @@ pub(super) static ROWS: [Row; 10] = [
             from: "S05-54 and S05-55",
             ours: ground,
         },
-        note: "This is the rest of one MOLA spacing, found by eye, after S05-54; with means of opposite sign added \
-               it is 49.9 px. An error of a footprint in plan moves both of its projections alike, so that the rest \
-               is no accuracy of MOLA.",
+        note: "This is the remainder of one MOLA spacing, estimated visually, after subtraction of S05-54; if means of \
+               opposite sign are added, it is 49.9 px. A planimetric error of a footprint moves both of its \
+               projections alike, so the remainder does not represent the accuracy of MOLA.",
     },
     Row {
         id: "S05-57",
@@ -253,7 +254,7 @@ pub(super) static ROWS: [Row; 10] = [
             ours: across,
         },
         note: "The paper sums over both images along the track, as its eq. 7 states, and averages across the track. \
-               Products and report contain both readings.",
+               Products and report contain both results.",
     },
     Row {
         id: "S05-58",
@@ -264,8 +265,8 @@ pub(super) static ROWS: [Row; 10] = [
             from: "S05-54 and S05-57, 4.4 m",
             ours: plan,
         },
-        note: "D_p is the distance of the two footprints of one point, not a standard deviation of a point. By eq. \
-               5 it is larger (S05-54).",
+        note: "D_p is the distance between the two footprints of one point, not a standard deviation of a point. \
+               According to eq. 5, it is larger (S05-54).",
     },
     Row {
         id: "S05-59",
@@ -276,7 +277,7 @@ pub(super) static ROWS: [Row; 10] = [
             from: "table 2",
             ours: mean_pixel,
         },
-        note: "With the unrounded mean D_p would be 182.2 m.",
+        note: "With the unrounded mean, D_p would be 182.2 m.",
     },
     Row {
         id: "S05-60",
@@ -287,7 +288,7 @@ pub(super) static ROWS: [Row; 10] = [
             from: "table 1 of Shan, Lee & Yoon 2002 (Eos)",
             ours: height_and_base,
         },
-        note: "One pair stands for three sites: with the printed emission angles B would be 123 km at Eos, 154 km at \
+        note: "One pair represents three sites: with the published emission angles, B would be 123 km at Eos, 154 km at \
                Gusev and 88 km at Isidis.",
     },
     Row {
@@ -310,8 +311,8 @@ pub(super) static ROWS: [Row; 10] = [
             from: "S05-57 and S05-61, 4.4 m",
             ours: height,
         },
-        note: "D_h is the same distance in height. If eq. 7 were applied across the track as along it, D_h would be \
-               √2 larger.",
+        note: "D_h is the same distance in height. If eq. 7 were applied across the track as it is along the track, \
+               D_h would be larger by a factor of √2.",
     },
     Row {
         id: "S05-63",

@@ -51,7 +51,7 @@ pub(super) async fn metrics(_: Reader, State(app): State<Arc<App>>) -> Result<Re
     let unavailable = roots.iter().filter(|root| root.state == "unavailable");
     let plain = Gauge::plain;
     gauges.extend([
-        plain("sites", "Sites that are enabled", sites.0 as f64),
+        plain("sites", "Enabled sites", sites.0 as f64),
         plain(
             "sites_stale",
             "Sites whose inputs are newer than their products",
@@ -59,7 +59,7 @@ pub(super) async fn metrics(_: Reader, State(app): State<Arc<App>>) -> Result<Re
         ),
         plain(
             "roots_unavailable",
-            "Input folders that are not available",
+            "Input folders that are unavailable",
             unavailable.count() as f64,
         ),
         plain(
@@ -69,7 +69,7 @@ pub(super) async fn metrics(_: Reader, State(app): State<Arc<App>>) -> Result<Re
         ),
         plain(
             "event_streams_open",
-            "Streams of events",
+            "Open event streams",
             app.open_streams() as f64,
         ),
     ]);

@@ -26,7 +26,7 @@ pub(super) async fn docs(
     let body = html! {
         p { (prose(text(&description["info"]["description"]))) }
         p {
-            "The same description for programs: " a href="/openapi.json" { "openapi.json" } " (OpenAPI "
+            "The same description in machine-readable form: " a href="/openapi.json" { "openapi.json" } " (OpenAPI "
             (text(&description["openapi"])) "). A token is sent as " code { "Authorization: Bearer areo_…" }
             "; " code { "areograph service token add" } " creates one."
         }

@@ -59,7 +59,7 @@ pub(super) async fn list(
     let kind = wanted.kind.filter(|kind| !kind.is_empty());
     let is_known = |kind: &String| KINDS.iter().any(|(known, _)| known == kind);
     if kind.as_ref().is_some_and(|kind| !is_known(kind)) {
-        return Err(Problem::bad_request("kind is not a kind of event."));
+        return Err(Problem::bad_request("kind is not a valid kind of event."));
     }
     let (of_kind, of_site) = (kind.clone(), site.clone());
     let found = app

@@ -4,12 +4,11 @@ use std::sync::Arc;
 
 use axum::{extract::State, response::Response};
 use maud::html;
-use serde::Deserialize;
 
 use super::{
     jobs::short,
     layout::Page,
-    parts::{more, size, table, times},
+    parts::{From, more, size, table, times},
     timeline::{Row, timeline},
 };
 use crate::{
@@ -21,12 +20,6 @@ use crate::{
 const KERNELS: u32 = 300;
 /// Sites listed with a kernel.
 const SITES: u32 = 4;
-
-/// Start of the next page of the list.
-#[derive(Debug, Deserialize)]
-pub(super) struct From {
-    after: Option<i64>,
-}
 
 /// Kernels with a timeline of their coverage.
 pub(super) async fn list(

@@ -4,12 +4,11 @@ use std::sync::Arc;
 
 use axum::{extract::State, response::Response};
 use maud::{Markup, html};
-use serde::Deserialize;
 
 use super::{
     jobs::job_table,
     layout::Page,
-    parts::{Times, lead, more, table, times, verdict},
+    parts::{From, Times, lead, more, table, times, verdict},
     trend::headline,
 };
 use crate::{
@@ -26,12 +25,6 @@ use crate::{
 const NIGHTS: u32 = 60;
 /// Jobs and runs on the page of a night.
 const MOST: u32 = 500;
-
-/// Start of the next page of a list.
-#[derive(Debug, Deserialize)]
-pub(super) struct From {
-    after: Option<i64>,
-}
 
 /// Nights, the newest first.
 pub(super) async fn list(

@@ -3,6 +3,7 @@
 use chrono::{DateTime, Utc};
 use chrono_tz::Tz;
 use maud::{Markup, PreEscaped, html};
+use serde::Deserialize;
 use serde_json::Value;
 
 use crate::{
@@ -180,6 +181,12 @@ pub(super) fn said(sentences: &[String]) -> Markup {
             several => ul { @for sentence in several { li { (prose(sentence)) } } }
         }
     }
+}
+
+/// Start of the next page of a list.
+#[derive(Debug, Deserialize)]
+pub(super) struct From {
+    pub(super) after: Option<i64>,
 }
 
 /// The link to the next page of a list.

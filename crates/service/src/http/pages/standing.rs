@@ -96,7 +96,7 @@ pub(super) fn standing(sites: &[Site], faults: &Faults<'_>, times: &Times) -> Ma
                 @for root in &away { li { "The folder " code { (root.path) } " has been unavailable since "
                     (times.at(root.since_utc)) ": " (root.detail) ". Its sites wait; nothing is lost." } }
                 @for wait in faults.waits { li { (cause(wait, sites)) } }
-                @if let Some(problem) = problem { li { "The changed configuration was rejected; the former \
+                @if let Some(problem) = problem { li { "The changed configuration was rejected; the previous \
                     configuration remains in force: " (problem) } }
                 (attention(faults.data, faults.recovering))
                 @for one in &wrong { li {
