@@ -22,6 +22,7 @@ mod pair;
 mod result;
 mod search;
 mod settle;
+mod sums;
 mod tidy;
 
 #[cfg(test)]

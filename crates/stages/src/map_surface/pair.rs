@@ -50,7 +50,7 @@ impl Pair {
         }
         let reach_m = reach / parallax.norm();
         let read = |at: usize, sight: &Sight| -> Result<Patch> {
-            let spans = sight.spans_px(&heights_m, reach_m, ROOM_PX);
+            let spans = sight.spans_px(&heights_m, reach_m, ROOM_PX, &tile);
             let pixels = level.views[at].pixels;
             let window = pixels.window_with_gaps(level.halvings[at], [&spans[0], &spans[1]])?;
             Ok(window.smoothed())
@@ -76,35 +76,54 @@ impl Pair {
         Matrix2::from_columns(&[along, Vector2::new(-along.y, along.x)])
     }
 
-    /// Each image at the samples of the tile, `above_m` above the known heights; NaN where it shows nothing.
-    pub(super) fn laid(&self, above_m: f64) -> [Vec<f32>; 2] {
+    /// Lays each image on the samples of the tile, `above_m` above the known heights; NaN where it shows nothing.
+    #[allow(
+        clippy::cast_possible_truncation,
+        reason = "a displacement of few pixels"
+    )]
+    pub(super) fn lay(&self, above_m: f64, images: &mut [Vec<f32>; 2]) {
+        let width = self.tile.size[1];
         let across = self.axes().column(1).into_owned();
-        [(0, -0.5), (1, 0.5)].map(|(image, share)| {
-            let sight = &self.sights[image];
+        let mut places_px = [vec![0.0; width], vec![0.0; width]];
+        for (image, (numbers, share)) in images.iter_mut().zip([-0.5, 0.5]).enumerate() {
+            let (sight, patch) = (&self.sights[image], &self.patches[image]);
             let step_px = sight.px_per_sample * across * share;
-            let samples = self.heights_m.iter().zip(&self.aside).enumerate();
-            let number = |(at, (height_m, aside)): (usize, (&f32, &f32))| {
-                let place = sight.place_px(at, f64::from(*height_m) + above_m);
-                self.patches[image].number(&(place + step_px * f64::from(*aside)))
-            };
-            samples.map(number).collect()
-        })
+            numbers.resize(self.heights_m.len(), f32::NAN);
+            let known = self.heights_m.chunks_exact(width);
+            let known = known.zip(self.aside.chunks_exact(width));
+            let lines = numbers.chunks_exact_mut(width).zip(known).enumerate();
+            for (line, (numbers, (heights_m, aside))) in lines {
+                let [lines, samples] = &mut places_px;
+                sight.places_px(line, (heights_m, above_m), patch.first, [lines, samples]);
+                for (places, step_px) in places_px.iter_mut().zip(step_px.iter()) {
+                    let step_px = *step_px as f32;
+                    for (place, aside) in places.iter_mut().zip(aside) {
+                        *place += step_px * aside;
+                    }
+                }
+                patch.numbers([&places_px[0], &places_px[1]], numbers);
+            }
+        }
     }
 
     /// The known height at a sample, metres.
-    pub(super) fn height_m(&self, at: usize) -> f64 {
-        f64::from(self.heights_m[at])
+    pub(super) fn height_m(&self, at: [usize; 2]) -> f64 {
+        f64::from(self.heights_m[self.index(at)])
     }
 
     /// Offset of the second image across the parallax at a sample.
-    pub(super) fn aside(&self, at: usize) -> f64 {
-        f64::from(self.aside[at])
+    pub(super) fn aside(&self, at: [usize; 2]) -> f64 {
+        f64::from(self.aside[self.index(at)])
     }
 
     /// Least distance of a sample from the edges of an image, pixels of its level; below 0 beyond them.
-    pub(super) fn edge_px(&self, at: usize) -> f64 {
-        let height_m = f64::from(self.heights_m[at]);
+    pub(super) fn edge_px(&self, at: [usize; 2]) -> f64 {
+        let height_m = self.height_m(at);
         let [one, other] = [0, 1].map(|image| self.sights[image].edge_px(at, height_m));
         one.min(other)
+    }
+
+    fn index(&self, [line, sample]: [usize; 2]) -> usize {
+        line * self.tile.size[1] + sample
     }
 }
