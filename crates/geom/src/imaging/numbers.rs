@@ -1,83 +1,91 @@
 //! Many interpolated values at once.
 
+use wide::{f32x4, i32x4};
+
 use super::Patch;
 
-/// Places whose pixels and fractions are computed together.
-const TOGETHER: usize = 16;
+/// Places that are computed together.
+const FOUR: usize = 4;
 
 impl Patch {
     /// The values at positions by the rule of [`Self::between`]: NaN where one of the 16 pixels around a position is
     /// missing. Lines and samples count from the middle of the first pixel of the patch.
     pub fn numbers(&self, [lines, samples]: [&[f32]; 2], numbers: &mut [f32]) {
-        let places = lines.chunks(TOGETHER).zip(samples.chunks(TOGETHER));
-        for ((lines, samples), numbers) in places.zip(numbers.chunks_mut(TOGETHER)) {
-            let mut near = [Near::default(); TOGETHER];
-            for (near, (line, sample)) in near.iter_mut().zip(lines.iter().zip(samples)) {
-                *near = self.near(*line, *sample);
+        let (lines, last_lines) = lines.as_chunks::<FOUR>();
+        let (samples, last_samples) = samples.as_chunks::<FOUR>();
+        let (numbers, last_numbers) = numbers.as_chunks_mut::<FOUR>();
+        for (number, (line, sample)) in numbers.iter_mut().zip(lines.iter().zip(samples)) {
+            *number = self.four([*line, *sample]);
+        }
+        let mut last = [[f32::NAN; FOUR]; 2];
+        for (last, places) in last.iter_mut().zip([last_lines, last_samples]) {
+            for (last, place) in last.iter_mut().zip(places) {
+                *last = *place;
             }
-            for (number, near) in numbers.iter_mut().zip(&near) {
-                *number = self.number(near);
-            }
+        }
+        for (number, last) in last_numbers.iter_mut().zip(self.four(last)) {
+            *number = last;
         }
     }
 
     #[allow(
         clippy::cast_possible_truncation,
+        clippy::cast_possible_wrap,
         clippy::cast_sign_loss,
-        reason = "patches have few pixels, and the place is compared with their size"
+        reason = "patches have few pixels; a place outside is not used"
     )]
-    fn near(&self, line: f32, sample: f32) -> Near {
-        let end = self.size.map(|length| length as f32 - 2.0);
+    fn four(&self, places: [[f32; FOUR]; 2]) -> [f32; FOUR] {
+        let [lines, samples] = places.map(f32x4::from);
+        let [line_end, sample_end] = self.size.map(|length| f32x4::splat(length as f32 - 2.0));
+        let first = f32x4::splat(1.0);
         // NaN is not inside.
-        let is_inside = (line >= 1.0) & (line < end[0]) & (sample >= 1.0) & (sample < end[1]);
-        let [row, column] = [line, sample].map(|of| of as i32);
-        let first = (row - 1)
-            .wrapping_mul(self.size[1] as i32)
-            .wrapping_add(column - 1);
-        Near {
-            first: if is_inside { first as u32 } else { u32::MAX },
-            down: line - row as f32,
-            right: sample - column as f32,
-        }
+        let inside = lines.simd_ge(first)
+            & lines.simd_lt(line_end)
+            & samples.simd_ge(first)
+            & samples.simd_lt(sample_end);
+        let inside = inside.to_bitmask();
+        // Of positive numbers the whole part.
+        let [rows, columns] = [lines, samples].map(|places| places.fast_trunc_int());
+        let one = i32x4::splat(1);
+        let starts = (rows - one) * i32x4::splat(self.size[1] as i32) + (columns - one);
+        let starts = starts.to_array();
+        let down = (lines - f32x4::from_i32x4(rows)).to_array();
+        let right = (samples - f32x4::from_i32x4(columns)).to_array();
+        std::array::from_fn(|at| {
+            if inside & (1 << at) == 0 {
+                f32::NAN
+            } else {
+                self.number(starts[at] as usize, down[at], right[at])
+            }
+        })
     }
 
-    fn number(&self, near: &Near) -> f32 {
-        let (start, width) = (near.first as usize, self.size[1]);
-        let Some(pixels) = self.values.get(start..start + 3 * width + 4) else {
-            return f32::NAN;
-        };
-        let [lines, samples] = [near.down, near.right].map(cubic);
-        let mut sums = [0.0_f32; 4];
-        for (line, weight) in lines.iter().enumerate() {
-            let row = &pixels[line * width..line * width + 4];
-            for (sum, pixel) in sums.iter_mut().zip(row) {
-                *sum += weight * pixel;
-            }
+    /// The value of the place this far behind the second line and sample of 16 pixels.
+    fn number(&self, start: usize, down: f32, right: f32) -> f32 {
+        let width = self.size[1];
+        let lines = cubic(down).to_array();
+        let mut sums = f32x4::splat(0.0);
+        for (line, weight) in lines.into_iter().enumerate() {
+            let pixels = self.values[start + line * width..].first_chunk();
+            let Some(pixels) = pixels else {
+                return f32::NAN;
+            };
+            sums += f32x4::from(*pixels) * f32x4::splat(weight);
         }
-        let [a, b, c, d]: [f32; 4] = std::array::from_fn(|at| sums[at] * samples[at]);
+        let [a, b, c, d] = (sums * cubic(right)).to_array();
         (a + b) + (c + d)
     }
 }
 
-/// The pixels around a place.
-#[derive(Debug, Clone, Copy, Default)]
-struct Near {
-    /// The first of the 16; `u32::MAX` where the patch lacks one of them.
-    first: u32,
-    /// Distances of the place behind the second line and sample.
-    down: f32,
-    right: f32,
-}
-
 /// Weights of four equally spaced values for one between the second and the third, `t` behind the second.
-fn cubic(t: f32) -> [f32; 4] {
-    const POWERS: [[f32; 4]; 4] = [
+fn cubic(t: f32) -> f32x4 {
+    let powers = [
         [0.0, 1.0, 0.0, 0.0],
         [-0.5, 0.0, 0.5, 0.0],
         [1.0, -2.5, 2.0, -0.5],
         [-0.5, 1.5, -1.5, 0.5],
     ];
-    std::array::from_fn(|at| {
-        POWERS[0][at] + t * (POWERS[1][at] + t * (POWERS[2][at] + t * POWERS[3][at]))
-    })
+    let [none, first, second, third] = powers.map(f32x4::from);
+    let t = f32x4::splat(t);
+    none + t * (first + t * (second + t * third))
 }

@@ -21,6 +21,7 @@ mod lines;
 mod pair;
 mod result;
 mod search;
+mod seen;
 mod settle;
 mod sums;
 mod tidy;

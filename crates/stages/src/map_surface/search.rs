@@ -6,9 +6,9 @@ use super::{
     Cell, Found,
     level::{Known, Level},
     pair::Pair,
+    seen::Seen,
     sums::{COUNT, Lines, add_numbers, add_products, over_squares},
 };
-use crate::ground::Tile;
 use areograph_base::{error::Result, ties::Unmatched};
 
 /// Half the edge of the compared square, samples of the ground.
@@ -29,13 +29,14 @@ const FLAT_DN: f64 = 0.8;
 /// The system's refusal to read the images' temporary files.
 pub(super) fn search(
     level: &Level<'_>,
-    tile: Tile,
+    seen: &Seen,
     known: &Known,
     reach: usize,
 ) -> Result<Vec<(usize, Cell)>> {
     let [_, columns] = level.ground.size;
+    let tile = &seen.tile;
     let cells: Vec<(usize, [usize; 2])> = tile.middles(level.per_cell, columns).collect();
-    let Some(pair) = Pair::of(level, tile, known, reach as f64 + 1.0)? else {
+    let Some(pair) = Pair::of(level, seen, known, reach as f64 + 1.0)? else {
         return Ok(cells.into_iter().map(|(cell, _)| (cell, None)).collect());
     };
     let step_m = 1.0 / pair.samples_per_m();
@@ -53,7 +54,12 @@ pub(super) fn search(
                 alike.push(Alike::of(sums));
             }
         };
-        over_squares(&pair.tile, level.per_cell, |line, sums| add(&images, pair.tile.line(line), sums), compare);
+        over_squares(
+            tile,
+            level.per_cell,
+            |line, sums| add(&images, tile.line(line), sums),
+            compare,
+        );
     }
     let judged = cells
         .into_iter()

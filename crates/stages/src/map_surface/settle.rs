@@ -12,9 +12,9 @@ use super::{
     level::{Known, Level},
     pair::Pair,
     search::HALF,
+    seen::Seen,
     sums::{COUNT, EDGE, Lines, add_numbers, add_products, over_squares},
 };
-use crate::ground::Tile;
 use areograph_base::{error::Result, ties::Unmatched};
 
 /// Largest distance of a cell from the surface, samples of parallax; beyond it, the match is false.
@@ -38,19 +38,20 @@ const GAIN: std::ops::RangeInclusive<f64> = 0.1..=10.0;
 ///
 /// # Errors
 /// The system's refusal to read the images' temporary files.
-pub(super) fn settle(level: &Level<'_>, tile: Tile, known: &Known) -> Result<Vec<(usize, Cell)>> {
+pub(super) fn settle(level: &Level<'_>, seen: &Seen, known: &Known) -> Result<Vec<(usize, Cell)>> {
     let [_, columns] = level.ground.size;
+    let tile = &seen.tile;
     let cells: Vec<(usize, [usize; 2])> = tile.middles(level.per_cell, columns).collect();
-    let Some(pair) = Pair::of(level, tile, known, 0.0)? else {
+    let Some(pair) = Pair::of(level, seen, known, 0.0)? else {
         return Ok(cells.into_iter().map(|(cell, _)| (cell, None)).collect());
     };
-    let width = pair.tile.size[1];
+    let width = tile.size[1];
     let mut images = [Vec::new(), Vec::new()];
     pair.lay(0.0, &mut images);
     let images = images.map(|image| Slopes::of(image, width, &pair.axes()));
     let mut sums = Vec::with_capacity(cells.len());
-    let add = |line: usize, sums: &mut Lines<SUMS>| add(&images, pair.tile.line(line), sums);
-    over_squares(&pair.tile, level.per_cell, add, |of_square| sums.push(of_square));
+    let add = |line: usize, sums: &mut Lines<SUMS>| add(&images, tile.line(line), sums);
+    over_squares(tile, level.per_cell, add, |of_square| sums.push(of_square));
     let settled = cells.into_iter().zip(sums).map(|((cell, middle), sums)| {
         let edge_px = pair.edge_px(middle);
         if edge_px < 0.0 {
@@ -93,8 +94,8 @@ impl Slopes {
         for (axis, slopes) in slopes.iter_mut().enumerate() {
             let [of_line, of_sample] = [0, 1].map(|of| axes[(of, axis)]);
             for line in 0..lines {
-                let [above, here, below] =
-                    [0, 1, 2].map(|down| &numbers[(line + down) * width..(line + down + 1) * width]);
+                let [above, here, below] = [0, 1, 2]
+                    .map(|down| &numbers[(line + down) * width..(line + down + 1) * width]);
                 let slopes = &mut slopes[(line + 1) * width + 1..(line + 2) * width - 1];
                 let along = above[1..].iter().zip(&below[1..]);
                 let across = here.iter().zip(&here[2..]);
@@ -296,15 +297,20 @@ impl Fit {
         let [offset, of_none] = [self.offset, self.influence_offset].map(|of| of as f32);
         let mut moves = [[0.0; PADDED]; EDGE];
         for (line, moves) in moves.iter_mut().enumerate() {
-            let span = first + line * width..first + line * width + EDGE;
-            let here = &template.0[0][span.clone()];
-            let there = other.0.each_ref().map(|of| &of[span.clone()]);
+            let of_line = |numbers: &[f32]| {
+                let start = first + line * width;
+                numbers[start..]
+                    .first_chunk::<EDGE>()
+                    .copied()
+                    .unwrap_or([f32::NAN; EDGE])
+            };
+            let here = of_line(&template.0[0]);
+            let [number, slope, aside] = other.0.each_ref().map(|of| of_line(of));
             for at in 0..EDGE {
-                let [number, slope, aside] = there.map(|of| of[at]);
-                let left = here[at] - (offset + gain * number + along * slope + across * aside);
+                let fitted = offset + gain * number[at] + along * slope[at] + across * aside[at];
                 let influence =
-                    of_none + of_number * number + of_along * slope + of_across * aside;
-                moves[BEFORE + at] = influence * left;
+                    of_none + of_number * number[at] + of_along * slope[at] + of_across * aside[at];
+                moves[BEFORE + at] = influence * (here[at] - fitted);
             }
         }
         self.independent
@@ -347,7 +353,10 @@ fn joined(moves: &[[f32; PADDED]; EDGE]) -> f64 {
                 *sum += of_line;
             }
         }
-        if let Some(of_line) = end.checked_sub(JOINED).and_then(|first| of_lines.get(first)) {
+        if let Some(of_line) = end
+            .checked_sub(JOINED)
+            .and_then(|first| of_lines.get(first))
+        {
             for (sum, of_line) in sums.iter_mut().zip(of_line) {
                 *sum -= of_line;
             }

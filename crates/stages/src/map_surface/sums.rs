@@ -23,8 +23,8 @@ pub(super) fn over_squares<const N: usize>(
 ) {
     let width = tile.size[1];
     let [rows, columns] = [0, 1].map(|axis| tile.cells[axis].len());
-    let [top, left] = [(0, rows), (1, columns)]
-        .map(|(axis, cells)| (tile.size[axis] - cells * per_cell) / 2);
+    let [top, left] =
+        [(0, rows), (1, columns)].map(|(axis, cells)| (tile.size[axis] - cells * per_cell) / 2);
     // Lines of the square beyond those of its cell: whole cells, and single lines.
     let beyond = HALF - (per_cell - 1) / 2;
     let (whole, single) = (beyond / per_cell, beyond % per_cell);
@@ -59,9 +59,9 @@ pub(super) fn over_squares<const N: usize>(
         }
         for column in 0..columns {
             let first = left + column * per_cell - beyond;
-            each(std::array::from_fn(|at| {
-                sum(&sums[at][first..first + EDGE])
-            }));
+            each(std::array::from_fn(
+                |at| sum(&sums[at][first..first + EDGE]),
+            ));
         }
     }
 }

@@ -148,7 +148,7 @@ impl Cells {
         let scale = (1_u64 << self.halvings) as f64;
         let has_heights = heights_m.iter().any(|height_m| !height_m.is_nan());
         let sight =
-            has_heights.then(|| Sight::of(view, scale, (&self.ground, 1), tile, &heights_m));
+            has_heights.then(|| Sight::of(view, scale, (&self.ground, 1), tile, (&heights_m, 0.0)));
         let Some(sight) = sight.flatten() else {
             return Ok(found);
         };
@@ -168,7 +168,9 @@ impl Cells {
             pixels,
             without_pixels,
         } = &mut found;
-        let of_lines = heights_m.chunks_exact(width).zip(pixels.chunks_exact_mut(width));
+        let of_lines = heights_m
+            .chunks_exact(width)
+            .zip(pixels.chunks_exact_mut(width));
         for (line, (heights_m, pixels)) in of_lines.enumerate() {
             let [lines, samples] = &mut places;
             sight.places_px(line, (heights_m, 0.0), patch.first, [lines, samples]);

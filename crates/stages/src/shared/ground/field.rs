@@ -20,8 +20,11 @@ impl Field {
     /// The number between four cells, beyond the edge the number of the cells at the edge; rows and columns count from
     /// the middle of the first cell.
     fn between(&self, row: f64, column: f64) -> f32 {
-        let [row, column] = [(row, 0), (column, 1)].map(|(at, axis)| Between::of(at, self.size[axis]));
-        let rows = row.ends.map(|at| &self.values[at * self.size[1]..][..self.size[1]]);
+        let [row, column] =
+            [(row, 0), (column, 1)].map(|(at, axis)| Between::of(at, self.size[axis]));
+        let rows = row
+            .ends
+            .map(|at| &self.values[at * self.size[1]..][..self.size[1]]);
         let [upper, lower] = rows.map(|row| column.of_row(row));
         upper + row.share * (lower - upper)
     }
@@ -123,7 +126,9 @@ impl Between {
         };
         let span = first.ends[0]..last.ends[1] + 1;
         let width = field.size[1];
-        let [above, below] = self.ends.map(|at| &field.values[at * width..][span.clone()]);
+        let [above, below] = self
+            .ends
+            .map(|at| &field.values[at * width..][span.clone()]);
         let rows = above.iter().zip(below);
         for (number, (above, below)) in row[span.clone()].iter_mut().zip(rows) {
             *number = above + self.share * (below - above);

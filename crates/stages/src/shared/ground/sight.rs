@@ -4,11 +4,18 @@ use std::ops::Range;
 
 use nalgebra::{Matrix2, Vector2};
 
-use super::{Ground, field::{Between, Field}};
+use super::{
+    Ground,
+    field::{Between, Field},
+};
 use crate::image_view::View;
 
 /// Samples from node to node. Over as many pixels an orientation bends by less than a thousandth of one.
 const STEP: usize = 16;
+/// Samples behind a node.
+const AT: [f32; STEP] = [
+    0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0,
+];
 /// Least height to either side of the middle at which nodes are computed, metres.
 const HEIGHTS_MIN_M: f64 = 60.0;
 
@@ -32,13 +39,7 @@ impl Tile {
         let [rows, columns] = spans;
         let columns: Vec<Range<usize>> = columns.collect();
         let tile = |rows: Range<usize>, columns: Range<usize>| {
-            let cells = [rows, columns];
-            let signed = |of: usize| i64::try_from(of).unwrap_or(i64::MAX);
-            Self {
-                first: [0, 1].map(|axis| signed(cells[axis].start * per_cell) - signed(margin)),
-                size: [0, 1].map(|axis| cells[axis].len() * per_cell + 2 * margin),
-                cells,
-            }
+            Self::over([rows, columns], per_cell, margin)
         };
         rows.flat_map(|rows| {
             let of_row = columns
@@ -47,6 +48,16 @@ impl Tile {
             of_row.collect::<Vec<_>>()
         })
         .collect()
+    }
+
+    /// The tile of these rows and columns of cells, with `margin` samples around them.
+    pub(crate) fn over(cells: [Range<usize>; 2], per_cell: usize, margin: usize) -> Self {
+        let signed = |of: usize| i64::try_from(of).unwrap_or(i64::MAX);
+        Self {
+            first: [0, 1].map(|axis| signed(cells[axis].start * per_cell) - signed(margin)),
+            size: [0, 1].map(|axis| cells[axis].len() * per_cell + 2 * margin),
+            cells,
+        }
     }
 
     /// Row and column of cells of a sample, 0 in the middle of the first cell.
@@ -120,17 +131,19 @@ pub(crate) struct Sight {
 type Powers = [Vector2<f64>; 3];
 
 impl Sight {
-    /// `None` where the orientation gives no place for the middle of the tile.
+    /// Over the range of these heights and `reach_m` beyond it; `None` where the orientation gives no place for the middle of
+    /// the tile.
     pub(crate) fn of(
         view: &View<'_>,
         scale: f64,
         (ground, per_cell): (&Ground, usize),
         tile: &Tile,
-        heights_m: &[f32],
+        (heights_m, reach_m): (&[f32], f64),
     ) -> Option<Self> {
-        let [low_m, high_m] = ends(heights_m).map(f64::from);
+        let ends_m = heights_m.iter().copied().fold(NOTHING, stretched);
+        let [low_m, high_m] = ends_m.map(f64::from);
         let middle_m = 0.5 * (low_m + high_m);
-        let half_m = HEIGHTS_MIN_M.max(0.5 * (high_m - low_m));
+        let half_m = HEIGHTS_MIN_M.max(0.5 * (high_m - low_m) + reach_m);
         let node = |at: [usize; 2]| -> Option<Powers> {
             let cell = tile.cell_of(at, per_cell);
             let place = |height_m: f64| {
@@ -219,10 +232,12 @@ impl Sight {
                 let step: [f32; 3] = std::array::from_fn(|power| {
                     ((ends[1][power][axis] - ends[0][power][axis]) / STEP as f64) as f32
                 });
-                for ((at, place), height_m) in (0_u16..).zip(places.iter_mut()).zip(heights_m) {
-                    let (at, above_m) = (f32::from(at), height_m - below_m);
-                    let [here, first, second]: [f32; 3] =
-                        std::array::from_fn(|power| start[power] + at * step[power]);
+                let known = heights_m.iter().zip(&AT);
+                for (place, (height_m, at)) in places.iter_mut().zip(known) {
+                    let above_m = height_m - below_m;
+                    let here = start[0] + at * step[0];
+                    let first = start[1] + at * step[1];
+                    let second = start[2] + at * step[2];
                     *place = here + above_m * (first + above_m * second);
                 }
             }
@@ -243,23 +258,29 @@ impl Sight {
         tile: &Tile,
     ) -> [Range<usize>; 2] {
         let (mut low, mut high) = (Vector2::repeat(f64::MAX), Vector2::repeat(f64::MIN));
-        let bands = heights_m.chunks(STEP * tile.size[1]);
-        for (row, band) in bands.enumerate() {
-            for column in 0..tile.size[1].div_ceil(STEP) {
-                let start = column * STEP;
-                let end = (start + STEP).min(tile.size[1]);
-                let lines = band.chunks_exact(tile.size[1]);
-                let of_lines = lines.map(|line| ends(&line[start..end]));
-                let [least_m, most_m] = of_lines
-                    .fold([f32::MAX, f32::MIN], |[low, high], line| {
-                        [low.min(line[0]), high.max(line[1])]
-                    })
-                    .map(f64::from);
+        let width = tile.size[1];
+        for (row, band) in heights_m.chunks(STEP * width).enumerate() {
+            let mut of_samples = vec![NOTHING; width];
+            for line in band.chunks_exact(width) {
+                for (ends, height_m) in of_samples.iter_mut().zip(line) {
+                    *ends = stretched(*ends, *height_m);
+                }
+            }
+            for (column, of_samples) in of_samples.chunks(STEP).enumerate() {
+                let [least_m, most_m] = of_samples.iter().fold(NOTHING, |ends, of_sample| {
+                    stretched(stretched(ends, of_sample[0]), of_sample[1])
+                });
                 if least_m > most_m {
                     continue;
                 }
+                let [least_m, most_m] = [least_m, most_m].map(f64::from);
                 let first = row * self.columns + column;
-                let corners = [first, first + 1, first + self.columns, first + self.columns + 1];
+                let corners = [
+                    first,
+                    first + 1,
+                    first + self.columns,
+                    first + self.columns + 1,
+                ];
                 for corner in corners {
                     for height_m in [least_m - reach_m, most_m + reach_m] {
                         let place = place(&self.nodes[corner], height_m - self.middle_m);
@@ -288,13 +309,15 @@ impl Sight {
     }
 }
 
-/// Least and largest of these numbers, without NaN.
-fn ends(numbers: &[f32]) -> [f32; 2] {
-    numbers
-        .iter()
-        .fold([f32::MAX, f32::MIN], |[low, high], number| {
-            [low.min(*number), high.max(*number)]
-        })
+/// Ends of no numbers.
+const NOTHING: [f32; 2] = [f32::MAX, f32::MIN];
+
+/// Least and largest number with another one, which NaN does not change.
+fn stretched([low, high]: [f32; 2], number: f32) -> [f32; 2] {
+    [
+        if number < low { number } else { low },
+        if number > high { number } else { high },
+    ]
 }
 
 /// Share of the way from one node to the next.
