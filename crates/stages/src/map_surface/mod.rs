@@ -133,7 +133,7 @@ type Cell = Option<std::result::Result<Found, Unmatched>>;
 
 impl Stage for MapSurface<'_> {
     const NAME: &'static str = "map_surface";
-    const METHOD: u32 = 4;
+    const METHOD: u32 = 5;
     type Output = Surface;
     stage_inputs!(fingerprint);
 
