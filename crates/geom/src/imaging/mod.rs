@@ -5,6 +5,7 @@ mod affine;
 mod correlation;
 mod interest;
 mod least_squares;
+mod numbers;
 mod patch;
 
 pub use affine::Affine;

@@ -94,24 +94,6 @@ impl Patch {
         Some(between)
     }
 
-    /// The value only, by the same rule: NaN where one of the 16 pixels is missing.
-    #[must_use]
-    pub fn number(&self, place: &Vector2<f64>) -> f32 {
-        let (Some((top, down)), Some((left, right))) =
-            (self.split(0, place.x), self.split(1, place.y))
-        else {
-            return f32::NAN;
-        };
-        #[allow(clippy::cast_possible_truncation, reason = "weights of bytes")]
-        let [lines, samples] = [down, right].map(|t| cubic(t)[0].map(|weight| weight as f32));
-        let rows = lines.iter().enumerate().map(|(line, weight)| {
-            let row = self.row(top + line, left..left + 4);
-            let [a, b, c, d] = [0, 1, 2, 3].map(|at| row[at] * samples[at]);
-            weight * ((a + b) + (c + d))
-        });
-        rows.sum()
-    }
-
     /// The first of the four pixels around a coordinate, and the coordinate's distance behind the second.
     #[allow(
         clippy::cast_possible_truncation,
@@ -120,11 +102,12 @@ impl Patch {
     )]
     fn split(&self, axis: usize, coordinate: f64) -> Option<(usize, f64)> {
         let behind = coordinate - 0.5 - self.first[axis] as f64;
-        let pixel = behind.floor();
-        let last = self.size[axis] as f64 - 3.0;
-        (1.0..=last)
-            .contains(&pixel)
-            .then(|| (pixel as usize - 1, behind - pixel))
+        let end = self.size[axis] as f64 - 2.0;
+        (1.0..end).contains(&behind).then(|| {
+            // Without its fraction; a call of `floor` costs more.
+            let pixel = behind as usize;
+            (pixel - 1, behind - pixel as f64)
+        })
     }
 
     /// The rectangle of another image with this `first` pixel and `size`, resampled from this image; `None` where the

@@ -288,3 +288,46 @@ fn smoothing_takes_what_alternates_and_keeps_slopes() {
     assert!((between.slope[0] - 2.0).abs() < 1e-5 && (between.slope[1] - 3.0).abs() < 1e-5);
     assert_eq!(smoothed.between(&Vector2::new(6.4, 16.0)), None);
 }
+
+#[test]
+fn many_numbers_are_those_of_single_places() {
+    let mut random = Random(9);
+    let size = [23, 31];
+    let mut values: Vec<f32> = (0..size[0] * size[1])
+        .map(|_| random.between(0.0, 255.0).round() as f32)
+        .collect();
+    values[11 * 31 + 17] = f32::NAN;
+    let patch = Patch {
+        first: [-40, 1_000],
+        size,
+        values,
+    };
+    // Also beyond every edge, on whole pixels, nowhere, and not a multiple of the numbers that are computed together.
+    let mut places: Vec<[f32; 2]> = (0..4_001)
+        .map(|_| [25.0, 33.0].map(|end| random.between(-2.0, end) as f32))
+        .collect();
+    let whole =
+        (0..23_u8).flat_map(|line| (0..31_u8).map(move |sample| [line, sample].map(f32::from)));
+    places.extend(whole);
+    places.push([f32::NAN, 5.0]);
+    let [lines, samples] =
+        [0, 1].map(|axis| -> Vec<f32> { places.iter().map(|place| place[axis]).collect() });
+    let mut numbers = vec![0.0; places.len()];
+    patch.numbers([&lines, &samples], &mut numbers);
+    let mut known = 0;
+    for (place, number) in places.iter().zip(numbers) {
+        let [line, sample] = place.map(f64::from);
+        let place = Vector2::new(line + 0.5 - 40.0, sample + 0.5 + 1_000.0);
+        let expected = patch
+            .between(&place)
+            .map_or(f64::NAN, |between| between.value);
+        // Grey values up to 255 and places up to 31 in single precision.
+        let is_equal = (f64::from(number) - expected).abs() < 2e-3;
+        assert!(
+            is_equal || (number.is_nan() && expected.is_nan()),
+            "{place:?}: {number}, {expected}"
+        );
+        known += usize::from(is_equal);
+    }
+    assert!(known > 2_500 && known < places.len());
+}

@@ -11,6 +11,9 @@ use areograph_geom::imaging::Patch;
 /// Halvings of an image: a pixel of the last level is 64 of the first along each axis.
 const LEVELS: usize = 7;
 
+/// Pixels between two lines of a window that cost less to read than a further call of the system.
+const READ_AT_ONCE: usize = 2_048;
+
 /// An image with its halvings.
 #[derive(Debug)]
 pub struct Pyramid {
@@ -185,13 +188,31 @@ impl Pyramid {
 
     /// Pixels of existing lines and samples.
     fn bytes(&self, level: &Level, [lines, samples]: [&Range<usize>; 2]) -> Result<Vec<u8>> {
+        let width = level.size[1];
+        let at = |line: usize| level.at + (line * width + samples.start) as u64;
+        let read = |bytes: &mut [u8], line: usize| {
+            let read = self.file.read_exact_at(bytes, at(line));
+            read.map_err(IoError::on("read a temporary file"))
+        };
+        let Some(between) = lines.len().checked_sub(1) else {
+            return Ok(Vec::new());
+        };
+        if width - samples.len() <= READ_AT_ONCE {
+            let mut bytes = vec![0; between * width + samples.len()];
+            read(&mut bytes, lines.start)?;
+            for line in 1..lines.len() {
+                bytes.copy_within(
+                    line * width..line * width + samples.len(),
+                    line * samples.len(),
+                );
+            }
+            bytes.truncate(lines.len() * samples.len());
+            return Ok(bytes);
+        }
         let mut bytes = vec![0; lines.len() * samples.len()];
         let rows = bytes.chunks_exact_mut(samples.len().max(1));
         for (line, row) in lines.clone().zip(rows) {
-            let at = level.at + (line * level.size[1] + samples.start) as u64;
-            self.file
-                .read_exact_at(row, at)
-                .map_err(IoError::on("read a temporary file"))?;
+            read(row, line)?;
         }
         Ok(bytes)
     }

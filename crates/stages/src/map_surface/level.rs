@@ -22,3 +22,10 @@ pub(super) struct Known {
     /// Offset of the ground in the second image against the first, across the parallax, samples of the ground.
     pub(super) aside: Field,
 }
+
+impl Level<'_> {
+    /// Pixels of an image for a pixel of its level.
+    pub(super) fn scale(&self, image: usize) -> f64 {
+        (1_u64 << self.halvings[image]) as f64
+    }
+}

@@ -7,21 +7,14 @@ use super::{
     Cell,
     common::Common,
     level::{Known, Level},
-    search::{self, search},
+    search::search,
+    seen::{Seen, seen, tiles},
     settle::settle,
     tidy::{field, without_strays},
 };
-use crate::{
-    ground::{Field, Tile},
-    image_view::View,
-    shot_heights::Heights,
-};
+use crate::{ground::Field, image_view::View, shot_heights::Heights};
 use areograph_base::{error::Result, watch::Watch};
 
-/// Samples of the ground along the edge of a tile: a thread holds some megabytes of both images.
-const TILE: usize = 240;
-/// Margin around a tile: half of the compared square, and a sample for slopes.
-const MARGIN: usize = search::HALF + 2;
 /// Reach of finer levels about the result of the coarser one, samples.
 const REACH: usize = 2;
 /// Largest reach of the coarsest level, samples.
@@ -66,8 +59,7 @@ pub(super) fn all_levels(
         .clamp(REACH as f64, REACH_MAX) as usize;
     // All at once, so that the time left is that of all levels.
     for times in 0..=deepest {
-        let tiles = tiles(&common.level(views, times)).len();
-        watch.announce(tiles * (1 + STEPS[usize::from(times > 0)]));
+        watch.announce(tiles(&common.level(views, times)) * passes(times));
     }
     let mut cells = Vec::new();
     for times in (0..=deepest).rev() {
@@ -81,7 +73,13 @@ pub(super) fn all_levels(
             };
         }
         let sample_m = height_of_sample_m(times);
-        cells = every_tile(&level, watch, |tile| search(&level, tile, &known, reach))?;
+        let reach_m = (reach + 1) as f64 * sample_m;
+        let seen = seen(&level, &known.heights_m, (reach, reach_m));
+        let unseen = (tiles(&level) - seen.len()) * passes(times);
+        watch.step(unseen as u64, "tiles");
+        cells = every_tile(&level, &seen, watch, |seen| {
+            search(&level, seen, &known, reach)
+        })?;
         cells = without_strays(&cells, size, sample_m);
         known.heights_m = field(&cells, &known.heights_m, SMOOTH[0], |found| found.height_m);
         for step in 0..STEPS[usize::from(times > 0)] {
@@ -89,7 +87,7 @@ pub(super) fn all_levels(
                 known.heights_m =
                     field(&cells, &known.heights_m, SMOOTH[1], |found| found.height_m);
             }
-            cells = every_tile(&level, watch, |tile| settle(&level, tile, &known))?;
+            cells = every_tile(&level, &seen, watch, |seen| settle(&level, seen, &known))?;
             cells = without_strays(&cells, size, sample_m);
             known.aside = field(&cells, &known.aside, SMOOTH_ASIDE, |found| found.aside);
         }
@@ -99,20 +97,21 @@ pub(super) fn all_levels(
     Ok(cells)
 }
 
-fn tiles(level: &Level<'_>) -> Vec<Tile> {
-    let edge = (TILE / level.per_cell).max(1);
-    Tile::all(level.ground.size, edge, level.per_cell, MARGIN)
+/// Passes over the tiles of the level after `times` halvings: the search, and steps of least squares.
+fn passes(times: usize) -> usize {
+    1 + STEPS[usize::from(times > 0)]
 }
 
 /// Calls `work` for every tile of a level, on all threads; the cells in order.
 fn every_tile(
     level: &Level<'_>,
+    seen: &[Seen],
     watch: Watch<'_>,
-    work: impl Fn(Tile) -> Result<Vec<(usize, Cell)>> + Sync,
+    work: impl Fn(&Seen) -> Result<Vec<(usize, Cell)>> + Sync,
 ) -> Result<Vec<Cell>> {
-    let worked = tiles(level).into_par_iter().map(|tile| {
+    let worked = seen.par_iter().map(|seen| {
         watch.check()?;
-        let worked = work(tile);
+        let worked = work(seen);
         watch.step(1, "tiles");
         worked
     });

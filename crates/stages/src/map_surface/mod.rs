@@ -21,7 +21,9 @@ mod lines;
 mod pair;
 mod result;
 mod search;
+mod seen;
 mod settle;
+mod sums;
 mod tidy;
 
 #[cfg(test)]
@@ -131,7 +133,7 @@ type Cell = Option<std::result::Result<Found, Unmatched>>;
 
 impl Stage for MapSurface<'_> {
     const NAME: &'static str = "map_surface";
-    const METHOD: u32 = 4;
+    const METHOD: u32 = 5;
     type Output = Surface;
     stage_inputs!(fingerprint);
 

@@ -2,8 +2,11 @@
 
 use nalgebra::{Matrix2, Vector2};
 
-use super::level::{Known, Level};
-use crate::ground::{Sight, Tile};
+use super::{
+    level::{Known, Level},
+    seen::Seen,
+};
+use crate::ground::Sight;
 use areograph_base::error::Result;
 use areograph_geom::imaging::Patch;
 
@@ -12,55 +15,47 @@ use areograph_geom::imaging::Patch;
 const ROOM_PX: f64 = 6.0;
 
 /// Both images over a tile of the ground.
-pub(super) struct Pair {
-    sights: [Sight; 2],
+pub(super) struct Pair<'a> {
+    seen: &'a Seen,
     patches: [Patch; 2],
     heights_m: Vec<f32>,
     aside: Vec<f32>,
-    pub(super) tile: Tile,
     /// Shift of the second image against the first for a metre of height, samples of the ground along both axes.
     parallax: Vector2<f64>,
 }
 
-impl Pair {
-    /// Both images of a tile, up to `reach` samples of parallax above and below the known heights; `None` where one of
-    /// them does not show it.
+impl<'a> Pair<'a> {
+    /// Both images of a tile, up to `reach` samples of parallax above and below the known heights; `None` where a height does
+    /// not move them against each other.
     ///
     /// # Errors
     /// The system's refusal to read the images' temporary files.
     pub(super) fn of(
         level: &Level<'_>,
-        tile: Tile,
+        seen: &'a Seen,
         known: &Known,
         reach: f64,
     ) -> Result<Option<Self>> {
+        let Seen { tile, sights } = seen;
+        let [one, other] = sights;
         let heights_m = tile.sampled(&known.heights_m, level.per_cell);
         let aside = tile.sampled(&known.aside, level.per_cell);
-        let sight = |at: usize| {
-            let scale = (1_u64 << level.halvings[at]) as f64;
-            let cells = (&level.ground, level.per_cell);
-            Sight::of(level.views[at], scale, cells, &tile, &heights_m)
-        };
-        let (Some(one), Some(other)) = (sight(0), sight(1)) else {
-            return Ok(None);
-        };
         let parallax = other.shift_per_m - one.shift_per_m;
         if !(parallax.norm() > 0.0) {
             return Ok(None);
         }
         let reach_m = reach / parallax.norm();
         let read = |at: usize, sight: &Sight| -> Result<Patch> {
-            let spans = sight.spans_px(&heights_m, reach_m, ROOM_PX);
+            let spans = sight.spans_px(&heights_m, reach_m, ROOM_PX, tile);
             let pixels = level.views[at].pixels;
             let window = pixels.window_with_gaps(level.halvings[at], [&spans[0], &spans[1]])?;
             Ok(window.smoothed())
         };
         Ok(Some(Self {
-            patches: [read(0, &one)?, read(1, &other)?],
-            sights: [one, other],
+            patches: [read(0, one)?, read(1, other)?],
+            seen,
             heights_m,
             aside,
-            tile,
             parallax,
         }))
     }
@@ -76,35 +71,54 @@ impl Pair {
         Matrix2::from_columns(&[along, Vector2::new(-along.y, along.x)])
     }
 
-    /// Each image at the samples of the tile, `above_m` above the known heights; NaN where it shows nothing.
-    pub(super) fn laid(&self, above_m: f64) -> [Vec<f32>; 2] {
+    /// Lays each image on the samples of the tile, `above_m` above the known heights; NaN where it shows nothing.
+    #[allow(
+        clippy::cast_possible_truncation,
+        reason = "a displacement of few pixels"
+    )]
+    pub(super) fn lay(&self, above_m: f64, images: &mut [Vec<f32>; 2]) {
+        let width = self.seen.tile.size[1];
         let across = self.axes().column(1).into_owned();
-        [(0, -0.5), (1, 0.5)].map(|(image, share)| {
-            let sight = &self.sights[image];
+        let mut places_px = [vec![0.0; width], vec![0.0; width]];
+        for (image, (numbers, share)) in images.iter_mut().zip([-0.5, 0.5]).enumerate() {
+            let (sight, patch) = (&self.seen.sights[image], &self.patches[image]);
             let step_px = sight.px_per_sample * across * share;
-            let samples = self.heights_m.iter().zip(&self.aside).enumerate();
-            let number = |(at, (height_m, aside)): (usize, (&f32, &f32))| {
-                let place = sight.place_px(at, f64::from(*height_m) + above_m);
-                self.patches[image].number(&(place + step_px * f64::from(*aside)))
-            };
-            samples.map(number).collect()
-        })
+            numbers.resize(self.heights_m.len(), f32::NAN);
+            let known = self.heights_m.chunks_exact(width);
+            let known = known.zip(self.aside.chunks_exact(width));
+            let lines = numbers.chunks_exact_mut(width).zip(known).enumerate();
+            for (line, (numbers, (heights_m, aside))) in lines {
+                let [lines, samples] = &mut places_px;
+                sight.places_px(line, (heights_m, above_m), patch.first, [lines, samples]);
+                for (places, step_px) in places_px.iter_mut().zip(step_px.iter()) {
+                    let step_px = *step_px as f32;
+                    for (place, aside) in places.iter_mut().zip(aside) {
+                        *place += step_px * aside;
+                    }
+                }
+                patch.numbers([&places_px[0], &places_px[1]], numbers);
+            }
+        }
     }
 
     /// The known height at a sample, metres.
-    pub(super) fn height_m(&self, at: usize) -> f64 {
-        f64::from(self.heights_m[at])
+    pub(super) fn height_m(&self, at: [usize; 2]) -> f64 {
+        f64::from(self.heights_m[self.index(at)])
     }
 
     /// Offset of the second image across the parallax at a sample.
-    pub(super) fn aside(&self, at: usize) -> f64 {
-        f64::from(self.aside[at])
+    pub(super) fn aside(&self, at: [usize; 2]) -> f64 {
+        f64::from(self.aside[self.index(at)])
     }
 
     /// Least distance of a sample from the edges of an image, pixels of its level; below 0 beyond them.
-    pub(super) fn edge_px(&self, at: usize) -> f64 {
-        let height_m = f64::from(self.heights_m[at]);
-        let [one, other] = [0, 1].map(|image| self.sights[image].edge_px(at, height_m));
+    pub(super) fn edge_px(&self, at: [usize; 2]) -> f64 {
+        let height_m = self.height_m(at);
+        let [one, other] = [0, 1].map(|image| self.seen.sights[image].edge_px(at, height_m));
         one.min(other)
+    }
+
+    fn index(&self, [line, sample]: [usize; 2]) -> usize {
+        line * self.seen.tile.size[1] + sample
     }
 }

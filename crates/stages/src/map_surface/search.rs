@@ -1,11 +1,14 @@
 //! The height at which two images, laid on the ground, are most alike.
 
+use std::ops::Range;
+
 use super::{
     Cell, Found,
     level::{Known, Level},
     pair::Pair,
+    seen::Seen,
+    sums::{COUNT, Lines, add_numbers, add_products, over_squares},
 };
-use crate::ground::Tile;
 use areograph_base::{error::Result, ties::Unmatched};
 
 /// Half the edge of the compared square, samples of the ground.
@@ -26,43 +29,65 @@ const FLAT_DN: f64 = 0.8;
 /// The system's refusal to read the images' temporary files.
 pub(super) fn search(
     level: &Level<'_>,
-    tile: Tile,
+    seen: &Seen,
     known: &Known,
     reach: usize,
 ) -> Result<Vec<(usize, Cell)>> {
     let [_, columns] = level.ground.size;
+    let tile = &seen.tile;
     let cells: Vec<(usize, [usize; 2])> = tile.middles(level.per_cell, columns).collect();
-    let Some(pair) = Pair::of(level, tile, known, reach as f64 + 1.0)? else {
+    let Some(pair) = Pair::of(level, seen, known, reach as f64 + 1.0)? else {
         return Ok(cells.into_iter().map(|(cell, _)| (cell, None)).collect());
     };
-    let width = pair.tile.size[1];
     let step_m = 1.0 / pair.samples_per_m();
     let mut alike: Vec<Vec<Alike>> = vec![Vec::with_capacity(2 * reach + 1); cells.len()];
+    let mut images = [Vec::new(), Vec::new()];
     for step in 0..=2 * reach {
-        let [one, other] = pair.laid((step as f64 - reach as f64) * step_m);
-        let sums = Sums::of(&one, &other, width);
-        for ((_, middle), alike) in cells.iter().zip(&mut alike) {
-            alike.push(sums.about(*middle));
+        pair.lay((step as f64 - reach as f64) * step_m, &mut images);
+        for numbers in images.iter_mut().flatten() {
+            // Numbers relative to the middle of a byte lose fewer digits.
+            *numbers -= 128.0;
         }
+        let mut alike = alike.iter_mut();
+        let compare = |sums| {
+            if let Some(alike) = alike.next() {
+                alike.push(Alike::of(sums));
+            }
+        };
+        over_squares(
+            tile,
+            level.per_cell,
+            |line, sums| add(&images, tile.line(line), sums),
+            compare,
+        );
     }
     let judged = cells
         .into_iter()
         .zip(&alike)
         .map(|((cell, middle), alike)| {
-            let at = middle[0] * width + middle[1];
-            let edge_px = pair.edge_px(at);
+            let edge_px = pair.edge_px(middle);
             if edge_px < 0.0 {
                 return (cell, None);
             }
             let found = best(alike, edge_px).map(|(step, correlation)| Found {
-                height_m: pair.height_m(at) + (step - reach as f64) * step_m,
+                height_m: pair.height_m(middle) + (step - reach as f64) * step_m,
                 sigma_m: step_m,
-                aside: pair.aside(at),
+                aside: pair.aside(middle),
                 correlation,
             });
             (cell, Some(found))
         });
     Ok(judged.collect())
+}
+
+/// Adds of a line of two images both numbers, their squares and their product.
+fn add(images: &[Vec<f32>; 2], span: Range<usize>, [a, b, aa, bb, ab]: &mut Lines<5>) {
+    let [one, other] = images.each_ref().map(|of| &of[span.clone()]);
+    add_numbers(a, one);
+    add_numbers(b, other);
+    add_products(aa, one, one);
+    add_products(bb, other, other);
+    add_products(ab, one, other);
 }
 
 /// The best of the steps, between them by a parabola, and its correlation.
@@ -122,62 +147,16 @@ struct Alike {
     whole: bool,
 }
 
-/// Sums from the first sample on: missing ones, both numbers, their squares and their product.
-struct Sums {
-    width: usize,
-    sums: Vec<[f64; 6]>,
-}
-
-impl Sums {
-    fn of(one: &[f32], other: &[f32], width: usize) -> Self {
-        let across = width + 1;
-        let mut sums = vec![[0.0; 6]; across * (one.len() / width + 1)];
-        let rows = one.chunks_exact(width).zip(other.chunks_exact(width));
-        for (line, (one, other)) in rows.enumerate() {
-            let mut row = [0.0; 6];
-            for (sample, (one, other)) in one.iter().zip(other).enumerate() {
-                if one.is_nan() || other.is_nan() {
-                    row[0] += 1.0;
-                } else {
-                    // Numbers relative to the middle of a byte lose fewer digits.
-                    let [a, b] = [one, other].map(|of| f64::from(*of) - 128.0);
-                    for (sum, term) in row[1..].iter_mut().zip([a, b, a * a, b * b, a * b]) {
-                        *sum += term;
-                    }
-                }
-                let above = sums[line * across + sample + 1];
-                let here = &mut sums[(line + 1) * across + sample + 1];
-                for (here, (above, row)) in here.iter_mut().zip(above.iter().zip(row)) {
-                    *here = above + row;
-                }
-            }
-        }
-        Self {
-            width: across,
-            sums,
-        }
-    }
-
-    /// Over the square about a sample.
-    fn about(&self, [line, sample]: [usize; 2]) -> Alike {
-        let corner = |down: usize, right: usize| {
-            &self.sums[(line + down - HALF) * self.width + sample + right - HALF]
-        };
-        let edge = 2 * HALF + 1;
-        let [first, right, below, last] = [
-            corner(0, 0),
-            corner(0, edge),
-            corner(edge, 0),
-            corner(edge, edge),
-        ];
-        let sum: [f64; 6] = std::array::from_fn(|of| last[of] - right[of] - below[of] + first[of]);
-        let count = (edge * edge) as f64;
-        let [missing, a, b, aa, bb, ab] = sum;
+impl Alike {
+    /// By the sums of both numbers, their squares and their product over a square.
+    fn of([a, b, aa, bb, ab]: [f64; 5]) -> Self {
+        let count = COUNT as f64;
         let [variance, other] = [aa - a * a / count, bb - b * b / count];
-        let whole = missing < 0.5;
+        // NaN where a pixel is missing.
+        let whole = (variance + other).is_finite();
         let spread_dn = (variance.min(other).max(0.0) / count).sqrt();
         let known = whole && spread_dn > 0.0;
-        Alike {
+        Self {
             correlation: if known {
                 (ab - a * b / count) / (variance * other).sqrt()
             } else {

@@ -148,25 +148,44 @@ impl Cells {
         let scale = (1_u64 << self.halvings) as f64;
         let has_heights = heights_m.iter().any(|height_m| !height_m.is_nan());
         let sight =
-            has_heights.then(|| Sight::of(view, scale, (&self.ground, 1), tile, &heights_m));
+            has_heights.then(|| Sight::of(view, scale, (&self.ground, 1), tile, (&heights_m, 0.0)));
         let Some(sight) = sight.flatten() else {
             return Ok(found);
         };
-        let [lines, samples] = sight.spans_px(&heights_m, 0.0, ROOM_PX);
+        let [lines, samples] = sight.spans_px(&heights_m, 0.0, ROOM_PX, tile);
         let patch = view
             .pixels
             .window_with_gaps(self.halvings, [&lines, &samples])?;
-        for (at, height_m) in heights_m.iter().enumerate() {
-            let height_m = f64::from(*height_m);
-            // NaN, where there is no height, is not above.
-            if !(sight.edge_px(at, height_m) >= EDGE_PX) {
-                continue;
-            }
-            let number = patch.number(&sight.place_px(at, height_m));
-            if number.is_nan() {
-                found.without_pixels += 1;
-            } else {
-                found.pixels[at] = byte(number);
+        let inside = [0, 1].map(|axis| {
+            let first = patch.first[axis] as f64 + 0.5;
+            let end = sight.size_px[axis] - EDGE_PX;
+            [EDGE_PX - first, end - first].map(|edge| edge as f32)
+        });
+        let width = tile.size[1];
+        let mut places = [vec![0.0; width], vec![0.0; width]];
+        let mut numbers = vec![0.0; width];
+        let Brightness {
+            pixels,
+            without_pixels,
+        } = &mut found;
+        let of_lines = heights_m
+            .chunks_exact(width)
+            .zip(pixels.chunks_exact_mut(width));
+        for (line, (heights_m, pixels)) in of_lines.enumerate() {
+            let [lines, samples] = &mut places;
+            sight.places_px(line, (heights_m, 0.0), patch.first, [lines, samples]);
+            patch.numbers([lines, samples], &mut numbers);
+            let shown = numbers.iter().zip(lines.iter().zip(samples.iter()));
+            for (pixel, (number, (line, sample))) in pixels.iter_mut().zip(shown) {
+                // NaN, where there is no height, is not inside.
+                let is_inside = [(line, inside[0]), (sample, inside[1])]
+                    .into_iter()
+                    .all(|(at, [start, end])| *at >= start && *at <= end);
+                match (is_inside, number.is_nan()) {
+                    (false, _) => {}
+                    (true, true) => *without_pixels += 1,
+                    (true, false) => *pixel = byte(*number),
+                }
             }
         }
         Ok(found)

@@ -157,6 +157,7 @@ enum RectifyError {
 
 impl Stage for RectifyImages<'_> {
     const NAME: &'static str = "rectify_images";
+    const METHOD: u32 = 2;
     type Output = Vec<Orthoimage>;
     stage_inputs!(fingerprint);
 

@@ -19,27 +19,14 @@ impl Field {
 
     /// The number between four cells, beyond the edge the number of the cells at the edge; rows and columns count from
     /// the middle of the first cell.
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "clamped to the field just before; numbers keep the precision of the field"
-    )]
-    pub(crate) fn between(&self, row: f64, column: f64) -> f32 {
-        let split = |at: f64, count: usize| {
-            let at = at.clamp(0.0, (count - 1) as f64);
-            let first = (at as usize).min(count.saturating_sub(2));
-            (
-                first,
-                (first + 1).min(count - 1),
-                (at - first as f64) as f32,
-            )
-        };
-        let (top, bottom, down) = split(row, self.size[0]);
-        let (left, right, along) = split(column, self.size[1]);
-        let at = |row: usize, column: usize| self.values[row * self.size[1] + column];
-        let upper = at(top, left) + along * (at(top, right) - at(top, left));
-        let lower = at(bottom, left) + along * (at(bottom, right) - at(bottom, left));
-        upper + down * (lower - upper)
+    fn between(&self, row: f64, column: f64) -> f32 {
+        let [row, column] =
+            [(row, 0), (column, 1)].map(|(at, axis)| Between::of(at, self.size[axis]));
+        let rows = row
+            .ends
+            .map(|at| &self.values[at * self.size[1]..][..self.size[1]]);
+        let [upper, lower] = rows.map(|row| column.of_row(row));
+        upper + row.share * (lower - upper)
     }
 
     /// The field in cells of half the edge, of which there are `size`.
@@ -98,6 +85,53 @@ impl Field {
         Self {
             size: self.size,
             values: means_of_runs(&across, columns, [rows, columns], half),
+        }
+    }
+}
+
+/// A place between two cells of a row or column.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Between {
+    ends: [usize; 2],
+    share: f32,
+}
+
+impl Between {
+    /// At a place of `count` cells, 0 in the middle of the first one; beyond the edge at the cell at the edge.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "clamped to the field just before; numbers keep the precision of the field"
+    )]
+    pub(crate) fn of(at: f64, count: usize) -> Self {
+        let at = at.clamp(0.0, (count - 1) as f64);
+        let first = (at as usize).min(count.saturating_sub(2));
+        Self {
+            ends: [first, (first + 1).min(count - 1)],
+            share: (at - first as f64) as f32,
+        }
+    }
+
+    /// The number there.
+    pub(crate) fn of_row(&self, row: &[f32]) -> f32 {
+        let [one, other] = self.ends.map(|at| row[at]);
+        one + self.share * (other - one)
+    }
+
+    /// The row of a field at this place between two rows, at the cells that `columns` need.
+    pub(crate) fn row_of(&self, field: &Field, columns: &[Self], row: &mut [f32]) {
+        let ends = [columns.first(), columns.last()];
+        let [Some(first), Some(last)] = ends else {
+            return;
+        };
+        let span = first.ends[0]..last.ends[1] + 1;
+        let width = field.size[1];
+        let [above, below] = self
+            .ends
+            .map(|at| &field.values[at * width..][span.clone()]);
+        let rows = above.iter().zip(below);
+        for (number, (above, below)) in row[span.clone()].iter_mut().zip(rows) {
+            *number = above + self.share * (below - above);
         }
     }
 }
