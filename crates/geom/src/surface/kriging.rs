@@ -8,6 +8,8 @@ use crate::blocked_cholesky::{BlockedCholesky, add_square};
 
 /// Fewest places of a task: a smaller one costs less than its start.
 const PLACES_MIN: usize = 16;
+/// Fewest profiles for which a product of matrices is faster than products of their columns.
+const PROFILES_MIN: usize = 8;
 
 /// The kriging equations of some shots, factorised.
 #[derive(Debug, Clone)]
@@ -60,7 +62,11 @@ pub(super) struct ProfileSums {
 impl ProfileSums {
     /// The sums at places, one row per profile.
     pub(super) fn at(&self, relation: &Relation) -> DMatrix<f64> {
-        let mut sums = self.solved.transpose() * &relation.covariance_m2;
+        let mut sums = if self.solved.ncols() < PROFILES_MIN {
+            self.solved.tr_mul(&relation.covariance_m2)
+        } else {
+            self.solved.transpose() * &relation.covariance_m2
+        };
         sums.ger(-1.0, &self.of_ones, &relation.multipliers, 1.0);
         sums
     }

@@ -159,10 +159,10 @@ impl LaserSurface {
     #[must_use]
     pub fn predict_each(&self, places_m: &[Vector3<f64>]) -> Vec<PlaceHeight> {
         let places = places_m.par_chunks(TOGETHER);
-        places.flat_map_iter(|of| self.pieces(of)).collect()
+        places.flat_map_iter(|of| self.predict_some(of)).collect()
     }
 
-    fn pieces(&self, places_m: &[Vector3<f64>]) -> Vec<PlaceHeight> {
+    fn predict_some(&self, places_m: &[Vector3<f64>]) -> Vec<PlaceHeight> {
         let at: Vec<Vector2<f64>> = places_m.iter().map(|place| self.plan.of(place)).collect();
         let sighted = self.sighted(&at);
         let mut variances_m2 = self.variances_m2(&at, |relation| relation);
