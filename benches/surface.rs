@@ -1,7 +1,7 @@
-//! A terrain model of two rendered lines, and units of shots that are matched with a terrain model: seconds, and
-//! rates per second.
+//! Heights of the ground between shots, a terrain model of two rendered lines, and units of shots that are matched with a
+//! terrain model: seconds, and rates per second.
 //!
-//! `cargo bench --bench surface`: both scenes are made and calibrated in temporary folders first, which is not timed.
+//! `cargo bench --bench surface`: the scenes are made and calibrated in temporary folders first, which is not timed.
 #![allow(
     clippy::unwrap_used,
     clippy::print_stdout,
@@ -17,6 +17,10 @@ use areograph::{
     body::Body,
     config::{CalibrationConfig, Document as _},
     flow::{PUBLISH, RunOptions, Task, run_task},
+    geom::{
+        ellipsoid::spherical_to_xyz_m,
+        surface::{LaserSurface, SurfaceOptions, SurfaceShot},
+    },
     pds::pixel_file::{PixelFile, Pyramid},
     scene::{write_calibration_loop_scene, write_terrain_model_scene},
     stages::{
@@ -46,6 +50,46 @@ fn timed<T>(run: impl Fn() -> T) -> (f64, T) {
         (began.elapsed().as_secs_f64(), given)
     });
     times.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap()
+}
+
+/// Profiles along meridians 5 km apart, 300 m from shot to shot, on ground of two waves.
+fn shots_of(profiles: u32, each: u32) -> Vec<SurfaceShot> {
+    let shot = |profile: u32, shot: u32| {
+        let [east_m, north_m] = [5_000.0 * f64::from(profile), 300.0 * f64::from(shot)];
+        SurfaceShot {
+            ground_m: ground_m(east_m, north_m),
+            profile: profile as usize,
+            attitude_known: true,
+            off_nadir_rad: 0.0,
+        }
+    };
+    let of = |profile| (0..each).map(move |index| shot(profile, index));
+    (0..profiles).flat_map(of).collect()
+}
+
+fn ground_m(east_m: f64, north_m: f64) -> Vector3<f64> {
+    let height_m = 40.0 * (east_m / 2_000.0).sin() + 25.0 * (north_m / 700.0).cos();
+    let radius_m = 3_396_190.0;
+    spherical_to_xyz_m(east_m / radius_m, north_m / radius_m, radius_m + height_m)
+}
+
+fn heights() {
+    for [profiles, each] in [[2, 185], [10, 150]] {
+        let shots = shots_of(profiles, each);
+        let options = SurfaceOptions::default();
+        let (made_s, surface) = timed(|| LaserSurface::new(&shots, &[], &options).unwrap());
+        let places: Vec<Vector3<f64>> = (0..10_000)
+            .map(|place| ground_m(0.4 * f64::from(place), 3.0 * f64::from(place)))
+            .collect();
+        let (each_s, _) = timed(|| surface.predict_each(&places));
+        let (mean_s, _) = timed(|| surface.predict_mean(&places[..1_000]));
+        let (whole_s, _) = timed(|| surface.predict(&places[..400]));
+        println!(
+            "ground between {} shots: {made_s:.3} s; 10,000 places one by one {each_s:.3} s, the mean of 1,000 {mean_s:.3} s, \
+             400 with the covariance between them {whole_s:.3} s",
+            shots.len()
+        );
+    }
 }
 
 fn terrain_models(folder: &Path) {
@@ -143,6 +187,7 @@ fn units(folder: &Path) {
 }
 
 fn main() {
+    heights();
     let folder = tempfile::tempdir().unwrap();
     units(folder.path());
     terrain_models(folder.path());

@@ -1,8 +1,8 @@
-"""Times sites of many images and of many tie points, made from a site of the synthetic mission: seconds, peak memory, and
-bytes of the page. Images are copies of two labels under other names, each a tick of the clock later than the one before;
-tie points are copies of those of the site with a noise of 0.3 pixels.
+"""Times sites of many images and of many tie points, and many sites, made from a site of the synthetic mission: seconds, peak
+memory, and bytes of the page. Images are copies of two labels under other names, each a tick of the clock later than the one before;
+tie points are copies of those of the site with a noise of 0.3 pixels; sites are copies without tie points.
 
-bench_many.py PROGRAM [--images N…] [--ties N…]
+bench_many.py PROGRAM [--images N…] [--ties N…] [--sites N…]
 """
 
 import argparse
@@ -37,8 +37,7 @@ def later(label, ticks):
 
 def many_images(mission, count):
     """A site of so many images without tie points."""
-    text = (mission / f"sites/{SITE}.toml").read_text().split("[[images]]")[0]
-    text = re.sub(r"\[(ties|adjustment)\]\n(?:[^\[\n].*\n)*", "", text)
+    text = without_ties(mission).split("[[images]]")[0]
     text = text.replace(f'site = "{SITE}"', f'site = "images_{count}"')
     for index in range(count):
         original, name = IMAGES[index % 2], f"S{index // 100000:02d}-{index % 100000:05d}"
@@ -48,6 +47,18 @@ def many_images(mission, count):
         (mission / f"labels/{name}.lbl").write_text(label)
         text += f'\n[[images]]\nid = "{name}"\nlabel = "../labels/{name}.lbl"\nlines_delivered = 7680\n'
     return written(mission, f"images_{count}", text)
+
+
+def without_ties(mission):
+    text = (mission / f"sites/{SITE}.toml").read_text()
+    return re.sub(r"\[(ties|adjustment)\]\n(?:[^\[\n].*\n)*", "", text)
+
+
+def many_sites(mission, count):
+    """So many sites of two images."""
+    text = without_ties(mission)
+    names = [f"copy_{index:05d}" for index in range(count)]
+    return [written(mission, name, text.replace(f'site = "{SITE}"', f'site = "{name}"')) for name in names]
 
 
 def many_ties(mission, count):
@@ -85,11 +96,25 @@ def measure(program, site, out):
     )
 
 
+def measure_all(program, sites, out):
+    """Runs many sites in one process."""
+    began = time.monotonic()
+    process = subprocess.Popen([program, "--quiet", "run", *sites, "--out", out], stdout=subprocess.DEVNULL)
+    _, _, used = os.wait4(process.pid, 0)
+    seconds, processors = time.monotonic() - began, used.ru_utime + used.ru_stime
+    print(
+        f"{len(sites)} sites: {seconds:.1f} s, {processors:.1f} s of processors ({processors / seconds:.2f} at a time), "
+        f"{used.ru_maxrss / 1024:.0f} MiB",
+        flush=True,
+    )
+
+
 def main():
     arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     arguments.add_argument("program")
     arguments.add_argument("--images", type=int, nargs="*", default=[2, 100, 300, 1000])
     arguments.add_argument("--ties", type=int, nargs="*", default=[1000, 10000, 50000])
+    arguments.add_argument("--sites", type=int, nargs="*", default=[300])
     wish = arguments.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         mission, out = pathlib.Path(folder) / "mission", f"{folder}/out"
@@ -98,6 +123,8 @@ def main():
             measure(wish.program, many_images(mission, count), out)
         for count in wish.ties:
             measure(wish.program, many_ties(mission, count), out)
+        for count in wish.sites:
+            measure_all(wish.program, many_sites(mission, count), f"{folder}/out_{count}")
 
 
 if __name__ == "__main__":

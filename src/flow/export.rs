@@ -12,6 +12,7 @@ use crate::{
     files::PartialFolder,
     products::{PageData, SiteProducts, export_footprints, exported_names},
     store::{
+        atomic,
         publish::read_manifest,
         published::{read_published_by_this_version, still_published},
     },
@@ -83,6 +84,11 @@ fn write(site: &SiteProducts, formats: &[ShotFormat], to: &Path) -> Result<Vec<(
         .map_err(IoError::on("make a temporary folder in"))
         .in_file(to)?;
     let products = export_footprints(draft.path(), site, formats)?;
+    let written = products.iter();
+    let written: Vec<PathBuf> = written
+        .map(|product| draft.path().join(&product.path))
+        .collect();
+    atomic::sync_files(&written)?;
     let files = products.into_iter().map(|product| {
         let path = to.join(&product.path);
         fs::rename(draft.path().join(&product.path), &path)

@@ -27,6 +27,7 @@
 
 pub mod attitude;
 pub mod block_equations;
+mod blocked_cholesky;
 pub mod body_rotation;
 pub mod bundle;
 pub mod calibration;

@@ -28,15 +28,12 @@ pub(super) fn create(path: &Path) -> Result<BufWriter<File>> {
     Ok(BufWriter::with_capacity(BUFFER_BYTES, file))
 }
 
-/// Writes the rest of the buffer through to the disk.
+/// Writes the rest of the buffer. All products are flushed to the disk together, before they receive their names.
 pub(super) fn finish(path: &Path, mut file: BufWriter<File>) -> Result<()> {
-    file.flush()
-        .and_then(|()| file.get_ref().sync_all())
-        .map_err(IoError::on("write"))
-        .in_file(path)
+    file.flush().map_err(IoError::on("write")).in_file(path)
 }
 
-/// Writes `bytes` to `path`, its folder made where missing, through to the disk.
+/// Writes `bytes` to `path`, its folder made where missing.
 ///
 /// # Errors
 /// Errors of the disk.

@@ -6,7 +6,7 @@
 //! writers of CSPICE, which need no loaded kernel. Parallel work uses the trajectory (Chebyshev pieces with a measured
 //! error) and the closed formula of the rotation of Mars, neither of which needs a session.
 
-use std::{cell::OnceCell, ffi::CString, rc::Rc};
+use std::{cell::OnceCell, ffi::CString, rc::Rc, sync::OnceLock};
 
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -141,9 +141,15 @@ impl Session {
     /// The version of CSPICE, for example `CSPICE_N0067`.
     ///
     /// # Errors
-    /// [`SpiceError::SessionOpen`] on a thread that holds a session.
+    /// [`SpiceError::SessionOpen`] for the first call, on a thread that holds a session.
     pub fn version_of_cspice() -> Result<String> {
-        Ok(Cspice::lock()?.version()?)
+        // Asked once: a site that publishes does not wait for the session of another.
+        static VERSION: OnceLock<String> = OnceLock::new();
+        if let Some(version) = VERSION.get() {
+            return Ok(version.clone());
+        }
+        let version = Cspice::lock()?.version()?;
+        Ok(VERSION.get_or_init(|| version).clone())
     }
 
     /// The kernels of this session.

@@ -5,7 +5,7 @@
 
 use std::sync::atomic::AtomicBool;
 
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::{Vector2, Vector3};
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -25,7 +25,7 @@ use areograph_base::{
 use areograph_config::MolaSurfaceConfig;
 use areograph_geom::{
     statistics::Summary,
-    surface::{LaserSurface, SurfaceHeights, SurfaceOptions},
+    surface::{MeanHeight, PlaceHeight, SurfaceOptions},
 };
 use areograph_store::{
     stage::{Input, Inputs, Output, Round, Stage},
@@ -34,9 +34,7 @@ use areograph_store::{
 
 /// A tie point nearer to a shot than this counts as controlled by it, metres.
 const NEAR_SHOT_M: f64 = 1_000.0;
-/// Tie points whose surface is predicted together.
-const TOGETHER: usize = 64;
-/// Of more tie points than this, an even selection is used for their common error: its covariance matrix is full.
+/// Of more tie points than this, an even selection is used for their common error, which has a term for every pair.
 const IN_COMMON_MAX: usize = 1_000;
 
 /// Heights of the tie points of a site with one orientation.
@@ -177,7 +175,7 @@ stage_inputs! {
 
 impl Stage for CheckHeights<'_> {
     const NAME: &'static str = "check_heights";
-    const METHOD: u32 = 7;
+    const METHOD: u32 = 8;
     type Output = HeightCheck;
     stage_inputs!(fingerprint);
 
@@ -213,13 +211,20 @@ pub fn check_heights(
     if points.is_empty() {
         return HeightCheck::without_surface("no tie point has a ground point".to_owned());
     }
-    let ties: Vec<TieHeight> = points
-        .par_chunks(TOGETHER)
-        .flat_map_iter(|points| heights(&surface, points))
-        .collect();
+    let found = surface.predict_each(&places_m);
+    let height =
+        |((tie, ground), found): (&(usize, Position<BodyFixed>), &PlaceHeight)| TieHeight {
+            tie: *tie,
+            ground: *ground,
+            height_m: surface.height_m(&ground.xyz_m).0,
+            surface_m: found.height_m,
+            surface_sigma_m: found.sigma_m,
+            nearest_shot_m: found.nearest_m,
+        };
+    let ties: Vec<TieHeight> = points.iter().zip(&found).map(height).collect();
     let step = places_m.len().div_ceil(IN_COMMON_MAX).max(1);
     let places_m: Vec<Vector3<f64>> = places_m.into_iter().step_by(step).collect();
-    let found = surface.predict(&places_m);
+    let slopes: Vec<Vector2<f64>> = found.iter().step_by(step).map(|of| of.slope).collect();
     let above_m: Vec<f64> = ties.iter().map(TieHeight::above_m).collect();
     let near = ties.iter().filter(|tie| tie.nearest_shot_m < NEAR_SHOT_M);
     HeightCheck {
@@ -227,29 +232,14 @@ pub fn check_heights(
             shots: surface.shots(),
             profiles: surface.profiles().len(),
             roughness_m: surface.variogram().roughness_m,
-            slope: slope(&found),
+            slope: slope(&slopes),
         }),
         above_m: Summary::of(&above_m),
-        mean_sigma_m: mean_variance_m2(&found.covariance_m2).sqrt(),
+        mean_sigma_m: surface.predict_mean(&places_m).variance_m2.sqrt(),
         near_shots: near.count(),
         apart: apart(&shots, &places_m, profiles, options),
         ties,
     }
-}
-
-/// Each of `points` compared with the surface.
-fn heights(surface: &LaserSurface, points: &[(usize, Position<BodyFixed>)]) -> Vec<TieHeight> {
-    let places_m: Vec<Vector3<f64>> = points.iter().map(|(_, ground)| ground.xyz_m).collect();
-    let found = surface.predict(&places_m);
-    let height = |(index, (tie, ground)): (usize, &(usize, Position<BodyFixed>))| TieHeight {
-        tie: *tie,
-        ground: *ground,
-        height_m: surface.height_m(&ground.xyz_m).0,
-        surface_m: found.heights_m[index],
-        surface_sigma_m: found.sigma_m(index),
-        nearest_shot_m: found.nearest_m[index],
-    };
-    points.iter().enumerate().map(height).collect()
 }
 
 impl HeightCheck {
@@ -266,21 +256,9 @@ impl HeightCheck {
 }
 
 /// Root mean square slope on an axis.
-fn slope(found: &SurfaceHeights) -> f64 {
-    let squares = found.slopes.iter().map(|slope| 0.5 * slope.norm_squared());
-    (squares.sum::<f64>() / found.slopes.len().max(1) as f64).sqrt()
-}
-
-/// Variance of the mean of values with this covariance.
-fn mean_variance_m2(covariance_m2: &DMatrix<f64>) -> f64 {
-    covariance_m2.sum() / (covariance_m2.nrows().max(1) as f64).powi(2)
-}
-
-/// The surface of one profile at the tie points: its mean height, and the variance of this mean.
-struct OneProfile<'a> {
-    id: &'a str,
-    mean_m: f64,
-    variance_m2: f64,
+fn slope(slopes: &[Vector2<f64>]) -> f64 {
+    let squares = slopes.iter().map(|slope| 0.5 * slope.norm_squared());
+    (squares.sum::<f64>() / slopes.len().max(1) as f64).sqrt()
 }
 
 /// The two of the separate profile surfaces that contradict each other most.
@@ -291,24 +269,19 @@ fn apart(
     options: &SurfaceOptions,
 ) -> Option<ProfilesApart> {
     let alone = shots.by_profile();
-    let found: Vec<OneProfile> = alone
+    let found: Vec<(&str, MeanHeight)> = alone
         .par_iter()
         .filter_map(|(index, shots)| {
             let surface = shots.surface(places_m, options).ok()?;
-            let found = surface.predict(places_m);
-            Some(OneProfile {
-                id: &profiles[*index].id,
-                mean_m: found.heights_m.iter().sum::<f64>() / places_m.len() as f64,
-                variance_m2: mean_variance_m2(&found.covariance_m2),
-            })
+            Some((&*profiles[*index].id, surface.predict_mean(places_m)))
         })
         .collect();
     let count = found.len() * found.len().saturating_sub(1) / 2;
-    let pairs = found.iter().enumerate().flat_map(|(index, one)| {
+    let pairs = found.iter().enumerate().flat_map(|(index, (id, one))| {
         let others = found[index + 1..].iter();
-        others.map(move |other| ProfilesApart {
-            profiles: [one, other].map(|profile| profile.id.to_owned()),
-            mean_m: one.mean_m - other.mean_m,
+        others.map(move |(other_id, other)| ProfilesApart {
+            profiles: [id, other_id].map(|id| (*id).to_owned()),
+            mean_m: one.height_m - other.height_m,
             sigma_m: (one.variance_m2 + other.variance_m2).sqrt(),
             pairs: count,
         })

@@ -162,7 +162,7 @@ stage_inputs! {
 
 impl Stage for CheckProfiles<'_> {
     const NAME: &'static str = "check_profiles";
-    const METHOD: u32 = 6;
+    const METHOD: u32 = 7;
     type Output = ProfileCheck;
     stage_inputs!(fingerprint);
 

@@ -150,12 +150,12 @@ pub fn has_work(site_folder: &Path) -> bool {
 /// # Errors
 /// A file cannot be read or flushed.
 pub fn entries(staging: &Path, files: &[(PathBuf, u64)]) -> Result<Vec<ProductEntry>> {
+    let paths = files.iter().map(|(relative, _)| staging.join(relative));
+    atomic::sync_files(&paths.collect::<Vec<_>>())?;
     files
         .par_iter()
         .map(|(relative, rows)| {
-            let path = staging.join(relative);
-            atomic::sync_file(&path)?;
-            let (blake3, bytes) = hash_file(&path)?;
+            let (blake3, bytes) = hash_file(&staging.join(relative))?;
             Ok(ProductEntry {
                 path: relative.to_string_lossy().replace('\\', "/"),
                 bytes,

@@ -10,9 +10,6 @@ use super::{
 };
 use crate::pushbroom::ExteriorOrientation;
 
-/// Points whose surface is predicted together; the covariance between them is not used.
-const TOGETHER: usize = 64;
-
 impl HeightResidual {
     /// Standard deviation of the height above the surface from the point's own rays, metres.
     #[must_use]
@@ -34,29 +31,29 @@ pub(super) fn compared<M: ExteriorOrientation>(
         .copied()
         .filter(|of| is_active(*of))
         .collect();
-    let pieces: Vec<Vec<HeightResidual>> = points
-        .par_chunks(TOGETHER)
-        .map_init(PointRows::default, |rows, points| {
-            let places_m: Vec<Vector3<f64>> =
-                points.iter().map(|of| at.state.points_m[*of]).collect();
-            let surface = control.surface.predict(&places_m);
-            let residual = |(index, point): (usize, &usize)| {
-                layout.fill(rows, at, *point).ok()?;
-                let triangle = rows.eliminate();
-                let (height_m, by_point) = control.surface.height_m(&places_m[index]);
-                let turned = triangle.tr_solve_upper_triangular(&by_point)?;
-                Some(HeightResidual {
-                    point: *point,
-                    above_m: height_m - surface.heights_m[index],
-                    surface_sigma_m: surface.sigma_m(index),
-                    ray_sigma_m: turned.norm(),
-                    nearest_shot_m: surface.nearest_m[index],
-                    weight_factor: 1.0,
-                    redundancy: 0.0,
-                })
-            };
-            points.iter().enumerate().filter_map(residual).collect()
+    let places_m: Vec<Vector3<f64>> = points.iter().map(|of| at.state.points_m[*of]).collect();
+    let surface = control.surface.predict_each(&places_m);
+    let residual = |rows: &mut PointRows, index: usize| {
+        let (point, here) = (points[index], &surface[index]);
+        layout.fill(rows, at, point).ok()?;
+        let triangle = rows.eliminate();
+        let (height_m, by_point) = control.surface.height_m(&places_m[index]);
+        let turned = triangle.tr_solve_upper_triangular(&by_point)?;
+        Some(HeightResidual {
+            point,
+            above_m: height_m - here.height_m,
+            surface_sigma_m: here.sigma_m,
+            ray_sigma_m: turned.norm(),
+            nearest_shot_m: here.nearest_m,
+            weight_factor: 1.0,
+            redundancy: 0.0,
         })
-        .collect();
-    pieces.into_iter().flatten().collect()
+    };
+    let residuals = (0..points.len()).into_par_iter();
+    let residuals = residuals.map_init(PointRows::default, residual);
+    residuals
+        .collect::<Vec<_>>()
+        .into_iter()
+        .flatten()
+        .collect()
 }

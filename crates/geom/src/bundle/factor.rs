@@ -8,10 +8,13 @@
 //! # Source
 //! Woodbury 1950, Inverting modified matrices.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use nalgebra::{DMatrix, DVector};
 
 use super::reduced_heights::ReducedHeights;
-use crate::block_equations::{BlockCholesky, BlockMatrix, Singular};
+use crate::{
+    block_equations::{BlockCholesky, BlockMatrix, Singular},
+    blocked_cholesky::BlockedCholesky,
+};
 
 /// Factorised reduced equations.
 pub(super) struct Factor {
@@ -26,7 +29,7 @@ struct HeightFactor {
     /// `Z`.
     solved: DMatrix<f64>,
     /// `K`.
-    capacity: Cholesky<f64, Dyn>,
+    capacity: BlockedCholesky,
 }
 
 impl Factor {
@@ -40,7 +43,7 @@ impl Factor {
             let solved = shared.solve_columns(&by_shared.transpose());
             let mut capacity = &heights.covariance_m2 + &by_shared * &solved;
             capacity = (&capacity + capacity.transpose()) * 0.5;
-            let capacity = Cholesky::new(capacity).ok_or_else(|| Singular {
+            let capacity = BlockedCholesky::new(capacity).ok_or_else(|| Singular {
                 unknowns: Vec::new(),
             })?;
             Ok(HeightFactor {
@@ -71,9 +74,8 @@ impl Factor {
     pub(super) fn cofactors(&self, matrix: &BlockMatrix) -> BlockMatrix {
         let mut cofactors = self.shared.inverse(matrix);
         if let Some(heights) = &self.heights {
-            let root = heights.capacity.l_dirty();
             let mut shares = heights.solved.transpose();
-            root.solve_lower_triangular_mut(&mut shares);
+            heights.capacity.solve_lower_mut(&mut shares);
             cofactors.subtract_squares(&shares);
         }
         cofactors
@@ -82,7 +84,8 @@ impl Factor {
     /// `(S + Gᵀ Σ⁻¹ G)⁻¹ Gᵀ Σ⁻¹ = Z K⁻¹`, one column per height, and `K⁻¹`.
     pub(super) fn through_heights(&self) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
         self.heights.as_ref().map(|heights| {
-            let through = heights.capacity.solve(&heights.solved.transpose());
+            let mut through = heights.solved.transpose();
+            heights.capacity.solve_mut(&mut through);
             (through.transpose(), heights.capacity.inverse())
         })
     }

@@ -8,7 +8,7 @@
 //! # Source
 //! The partitioned inverse (Woodbury 1950) of normal equations with additional observations of the points.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
+use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::{
     HeightResidual,
@@ -17,7 +17,10 @@ use super::{
     layout::{Layout, Linearised},
     point_rows::PointRows,
 };
-use crate::pushbroom::{ExteriorOrientation, Unseen};
+use crate::{
+    blocked_cholesky::BlockedCholesky,
+    pushbroom::{ExteriorOrientation, Unseen},
+};
 
 /// Heights in terms of the shared unknowns.
 #[derive(Clone)]
@@ -34,10 +37,10 @@ pub(super) struct ReducedHeights {
     moves: Vec<Vector3<f64>>,
     /// Covariance of surface, jitter and rays together, `Σ`, m².
     pub(super) covariance_m2: DMatrix<f64>,
-    factor: Cholesky<f64, Dyn>,
+    factor: BlockedCholesky,
     /// Covariance of the observed heights: surface, robust weights and jitter, m², and its factor.
     observed_m2: DMatrix<f64>,
-    of_surface: Cholesky<f64, Dyn>,
+    of_surface: BlockedCholesky,
 }
 
 impl ReducedHeights {
@@ -89,8 +92,8 @@ impl ReducedHeights {
             DVector::from_iterator(count, turned.iter().map(Vector3::norm_squared));
         let with_rays_m2 = &covariance_m2 + DMatrix::from_diagonal(&ray_variances_m2);
         // An invalid covariance comes from points without a finite position.
-        let factor = Cholesky::new(with_rays_m2.clone()).ok_or(Unseen::BehindCamera)?;
-        let of_surface = Cholesky::new(covariance_m2.clone()).ok_or(Unseen::BehindCamera)?;
+        let factor = BlockedCholesky::new(with_rays_m2.clone()).ok_or(Unseen::BehindCamera)?;
+        let of_surface = BlockedCholesky::new(covariance_m2.clone()).ok_or(Unseen::BehindCamera)?;
         Ok(Self {
             misclosures_m,
             by_shared,
@@ -114,7 +117,9 @@ impl ReducedHeights {
 
     /// `Σ⁻¹G`.
     pub(super) fn weighted(&self) -> DMatrix<f64> {
-        self.factor.solve(&self.by_shared)
+        let mut weighted = self.by_shared.clone();
+        self.factor.solve_mut(&mut weighted);
+        weighted
     }
 
     /// `Σ⁻¹`.
@@ -136,7 +141,11 @@ impl ReducedHeights {
     /// Redundancy numbers are the diagonal of the covariance of the observed heights times `left`. With correlated observations
     /// a single number may lie outside `0..=1`; only their sum is meaningful.
     pub(super) fn residuals(&self, heights: &Heights, left: &DMatrix<f64>) -> Vec<HeightResidual> {
-        let redundancies = (&self.observed_m2 * left).diagonal();
+        let redundancies: Vec<f64> = left
+            .column_iter()
+            .zip(self.observed_m2.column_iter())
+            .map(|(left, observed_m2)| left.dot(&observed_m2))
+            .collect();
         (0..heights.points.len())
             .map(|index| {
                 let variance_m2 = heights.surface.covariance_m2[(index, index)];

@@ -1,9 +1,9 @@
 //! A power with one fixed exponent, for kernels that are evaluated millions of times.
 
 /// Nodes between two powers of two.
-const NODES: usize = 64;
+const NODES: usize = 512;
 /// Terms of the series around a node: the next one is below 1e-16.
-const TERMS: usize = 7;
+const TERMS: usize = 5;
 /// Exponents of two in the table.
 const EXPONENTS: i32 = 64;
 /// Bits of the fraction of an `f64`, and the bias of its exponent.
@@ -12,7 +12,7 @@ const BIAS: i32 = 1_023;
 
 /// `x^p` of a fixed `p`, to a few units of the last place.
 ///
-/// With `x = 2^e · m · (1 + r)`, `m` the middle of one of 64 intervals of the significand, the first two factors are table
+/// With `x = 2^e · m · (1 + r)`, `m` the middle of one of 512 intervals of the significand, the first two factors are table
 /// entries and the last is the binomial series.
 #[derive(Debug)]
 pub(super) struct FractionalPower {
@@ -50,7 +50,7 @@ impl FractionalPower {
         clippy::cast_possible_truncation,
         clippy::cast_possible_wrap,
         clippy::cast_sign_loss,
-        reason = "eleven bits of an exponent, six of a fraction"
+        reason = "eleven bits of an exponent, nine of a fraction"
     )]
     pub(super) fn of(&self, x: f64) -> f64 {
         const INDEX_BITS: u32 = NODES.ilog2();

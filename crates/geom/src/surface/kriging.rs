@@ -3,9 +3,13 @@
 use nalgebra::{DMatrix, DVector, Vector2};
 use rayon::prelude::*;
 
-use super::{
-    Placed, SharedErrors, Variogram, blocked_cholesky::BlockedCholesky, shot::PROFILE_PLAN_M,
-};
+use super::{Placed, SharedErrors, Variogram};
+use crate::blocked_cholesky::{BlockedCholesky, add_square};
+
+/// Fewest places of a task: a smaller one costs less than its start.
+const PLACES_MIN: usize = 16;
+/// Fewest profiles for which a product of matrices is faster than products of their columns.
+const PROFILES_MIN: usize = 8;
 
 /// The kriging equations of some shots, factorised.
 #[derive(Debug, Clone)]
@@ -18,23 +22,53 @@ pub(super) struct Kriging {
     factor: BlockedCholesky,
     /// The equations' solution for ones, and its sum.
     of_ones: DVector<f64>,
+    sum_of_ones: f64,
     /// Mean height, and the contribution of each shot to the height of a point by its covariance with it.
     mean_m: f64,
     strengths: DVector<f64>,
 }
 
-/// Weights of shots, one column per point, with the multiplier that keeps their sum at 1.
-pub(super) struct Weights {
-    /// Variogram between shots and points, m².
-    between_m2: DMatrix<f64>,
-    of_shots: DMatrix<f64>,
+/// The ground at some places, or weighted sums of it, in terms of the shots: one column per place.
+pub(super) struct Relation {
+    /// Covariance of the ground between shots and places, m².
+    covariance_m2: DMatrix<f64>,
+    /// Multipliers that keep the sums of the weights of the shots at the sums of the weights of the places.
     multipliers: DVector<f64>,
 }
 
-#[cfg(test)]
-impl Weights {
-    pub(super) const fn of_shots(&self) -> &DMatrix<f64> {
-        &self.of_shots
+impl Relation {
+    /// The weighted sum of the places.
+    pub(super) fn summed(&self, of_places: &DVector<f64>) -> Self {
+        let covariance_m2 = &self.covariance_m2 * of_places;
+        Self {
+            covariance_m2: DMatrix::from_column_slice(
+                covariance_m2.len(),
+                1,
+                covariance_m2.as_slice(),
+            ),
+            multipliers: DVector::from_element(1, self.multipliers.dot(of_places)),
+        }
+    }
+}
+
+/// Sums of factors of the shots of each profile times their weights, whatever the place.
+#[derive(Debug, Clone)]
+pub(super) struct ProfileSums {
+    /// The equations' solutions for the factors, one column per profile.
+    solved: DMatrix<f64>,
+    of_ones: DVector<f64>,
+}
+
+impl ProfileSums {
+    /// The sums at places, one row per profile.
+    pub(super) fn at(&self, relation: &Relation) -> DMatrix<f64> {
+        let mut sums = if self.solved.ncols() < PROFILES_MIN {
+            self.solved.tr_mul(&relation.covariance_m2)
+        } else {
+            self.solved.transpose() * &relation.covariance_m2
+        };
+        sums.ger(-1.0, &self.of_ones, &relation.multipliers, 1.0);
+        sums
     }
 }
 
@@ -78,13 +112,15 @@ impl Kriging {
         let factor = BlockedCholesky::new(matrix)?;
         let of_ones = factor.solve(&DVector::repeat(shots.len(), 1.0));
         let heights_m = DVector::from_iterator(shots.len(), shots.iter().map(|shot| shot.height_m));
-        let mean_m = of_ones.dot(&heights_m) / of_ones.sum();
+        let sum_of_ones = of_ones.sum();
+        let mean_m = of_ones.dot(&heights_m) / sum_of_ones;
         let strengths = factor.solve(&heights_m.add_scalar(-mean_m));
         mean_m.is_finite().then_some(Self {
             shots,
             variogram,
             sill_m2,
             factor,
+            sum_of_ones,
             of_ones,
             mean_m,
             strengths,
@@ -94,75 +130,137 @@ impl Kriging {
     /// Height of the surface at a point, metres.
     pub(super) fn height_m(&self, place: &Vector2<f64>) -> f64 {
         let shots = self.shots.iter().zip(&self.strengths);
-        let above_m = shots.map(|(shot, strength)| strength * self.covariance(shot, place));
+        let above_m =
+            shots.map(|(shot, strength)| strength * self.covariance_m2(&shot.plan_m, place));
         self.mean_m + above_m.sum::<f64>()
     }
 
     /// Distance of the nearest shot, metres.
     pub(super) fn nearest_m(&self, place: &Vector2<f64>) -> f64 {
-        let distances_m = self.shots.iter().map(|shot| (shot.plan_m - place).norm());
-        distances_m.fold(f64::INFINITY, f64::min)
+        let squares_m2 = self
+            .shots
+            .iter()
+            .map(|shot| (shot.plan_m - place).norm_squared());
+        squares_m2.fold(f64::INFINITY, f64::min).sqrt()
     }
 
-    fn covariance(&self, shot: &Placed, place: &Vector2<f64>) -> f64 {
-        self.sill_m2 - self.variogram.between(&shot.plan_m, place)
+    fn covariance_m2(&self, one: &Vector2<f64>, other: &Vector2<f64>) -> f64 {
+        self.sill_m2 - self.variogram.between(one, other)
     }
 
-    pub(super) fn weights(&self, places: &[Vector2<f64>]) -> Weights {
-        let mut between_m2 = DMatrix::zeros(self.shots.len(), places.len());
-        let columns = between_m2.as_mut_slice().par_chunks_mut(self.shots.len());
-        columns.zip(places).for_each(|(column, place)| {
+    /// The ground at `places`.
+    pub(super) fn at(&self, places: &[Vector2<f64>]) -> Relation {
+        let mut covariance_m2 = DMatrix::zeros(self.shots.len(), places.len());
+        let columns = covariance_m2
+            .as_mut_slice()
+            .par_chunks_mut(self.shots.len());
+        let columns = columns.zip(places).with_min_len(PLACES_MIN);
+        columns.for_each(|(column, place)| {
             for (value, shot) in column.iter_mut().zip(&self.shots) {
-                *value = self.variogram.between(&shot.plan_m, place);
+                *value = self.covariance_m2(&shot.plan_m, place);
             }
         });
-        let mut of_shots = between_m2.map(|variogram_m2| self.sill_m2 - variogram_m2);
-        self.factor.solve_mut(&mut of_shots);
-        let multipliers = DVector::from_iterator(
-            places.len(),
-            of_shots
-                .column_iter()
-                .map(|weights| (weights.sum() - 1.0) / self.of_ones.sum()),
-        );
-        of_shots -= &self.of_ones * multipliers.transpose();
-        Weights {
-            between_m2,
-            of_shots,
+        let multipliers = (covariance_m2.tr_mul(&self.of_ones)).add_scalar(-1.0) / self.sum_of_ones;
+        Relation {
+            covariance_m2,
             multipliers,
         }
     }
 
-    /// Covariance of surface minus ground between all `places`, m², with the errors that shots of a profile share.
+    /// Heights of the surface, metres.
+    pub(super) fn heights_m(&self, relation: &Relation) -> Vec<f64> {
+        let heights_m = relation.covariance_m2.tr_mul(&self.strengths);
+        heights_m.add_scalar(self.mean_m).as_slice().to_vec()
+    }
+
+    /// Adds to the lower triangle of `sum` the covariance of surface minus ground between places, m², without the
+    /// covariance of the ground itself.
     ///
-    /// By the equations of the weights, `Γwⱼ − Nwⱼ = γⱼ + μⱼ` with the covariance `N` of the errors of the shots, three
-    /// of the five terms of `−γᵢⱼ + wᵢᵀγⱼ + wⱼᵀγᵢ − wᵢᵀΓwⱼ + wᵢᵀNwⱼ` are one.
-    pub(super) fn covariance_m2(&self, places: &[Vector2<f64>], weights: &Weights) -> DMatrix<f64> {
-        // `tr_mul` takes seven times as long.
-        let mut covariance = weights.between_m2.transpose() * &weights.of_shots;
-        for (column, place) in places.iter().enumerate() {
-            for (row, other) in places.iter().enumerate() {
-                covariance[(row, column)] -=
-                    self.variogram.between(place, other) + weights.multipliers[column];
+    /// With the factor `K = L Lᵀ` of the equations, the covariances `c` between shots and a place, its multiplier `μ` and
+    /// weights `w = K⁻¹ (c − μ 1)`, four of the five terms of `C − wᵢᵀcⱼ − wⱼᵀcᵢ + wᵢᵀK wⱼ` are
+    /// `−(L⁻¹cᵢ)ᵀ L⁻¹cⱼ + μᵢ μⱼ 1ᵀK⁻¹1`.
+    pub(super) fn add_errors_m2(&self, sum: &mut DMatrix<f64>, relation: Relation) {
+        let Relation {
+            mut covariance_m2,
+            multipliers,
+        } = relation;
+        self.factor.solve_lower_mut(&mut covariance_m2);
+        add_square(sum, -1.0, &covariance_m2);
+        sum.ger(self.sum_of_ones, &multipliers, &multipliers, 1.0);
+    }
+
+    /// The diagonal of [`Self::add_errors_m2`].
+    pub(super) fn variances_m2(&self, relation: Relation) -> DVector<f64> {
+        let Relation {
+            mut covariance_m2,
+            multipliers,
+        } = relation;
+        self.factor.solve_lower_mut(&mut covariance_m2);
+        let columns = covariance_m2.column_iter().zip(&multipliers);
+        let variances_m2 = columns.map(|(column, multiplier)| {
+            self.sum_of_ones * multiplier * multiplier - column.norm_squared()
+        });
+        DVector::from_iterator(multipliers.len(), variances_m2)
+    }
+
+    /// Variance of the ground at a place, m²: the constant that the sums of the weights remove from all errors.
+    pub(super) const fn ground_m2(&self) -> f64 {
+        self.sill_m2
+    }
+
+    /// Covariance of the ground between all `places`, m²: the lower triangle.
+    pub(super) fn between_m2(&self, places: &[Vector2<f64>]) -> DMatrix<f64> {
+        let mut covariance_m2 = DMatrix::zeros(places.len(), places.len());
+        let columns = covariance_m2
+            .as_mut_slice()
+            .par_chunks_mut(places.len().max(1));
+        columns.enumerate().for_each(|(index, column)| {
+            let others = column.iter_mut().zip(places).skip(index);
+            for (value, other) in others {
+                *value = self.covariance_m2(&places[index], other);
             }
+        });
+        covariance_m2
+    }
+
+    /// Variance of a weighted sum of the ground at `places`, m².
+    pub(super) fn variance_of_sum_m2(
+        &self,
+        places: &[Vector2<f64>],
+        of_places: &DVector<f64>,
+    ) -> f64 {
+        let with_later = |(index, place): (usize, &Vector2<f64>)| {
+            let later = places.iter().zip(of_places).skip(index + 1);
+            let covariances_m2 =
+                later.map(|(other, weight)| weight * self.covariance_m2(place, other));
+            let own_m2 = of_places[index] * self.sill_m2;
+            of_places[index] * (own_m2 + 2.0 * covariances_m2.sum::<f64>())
+        };
+        // Added in order: the same bits with any number of threads.
+        let of_each: Vec<f64> = places.par_iter().enumerate().map(with_later).collect();
+        of_each.iter().sum()
+    }
+
+    /// Profiles that shots of the surface belong to, by their indices, ascending.
+    pub(super) fn profiles(&self) -> Vec<usize> {
+        let mut profiles: Vec<usize> = self.shots.iter().map(|shot| shot.profile).collect();
+        profiles.sort_unstable();
+        profiles.dedup();
+        profiles
+    }
+
+    /// Sums of the weights of each profile, times a factor of the errors that its shots share.
+    pub(super) fn sums_of_profiles(&self, factor: impl Fn(&SharedErrors) -> f64) -> ProfileSums {
+        let profiles = self.profiles();
+        let mut solved = DMatrix::zeros(self.shots.len(), profiles.len());
+        for (row, shot) in self.shots.iter().enumerate() {
+            // Every shot has its profile in the list.
+            let of = profiles.partition_point(|profile| *profile < shot.profile);
+            solved[(row, of)] = factor(&shot.shared);
         }
-        // Rounding leaves it slightly asymmetric.
-        0.5 * (&covariance + covariance.transpose())
-    }
-
-    /// Sums of the weights of each profile, times the factor of the radial errors that its shots share, one row per profile.
-    pub(super) fn radial_of_profiles(&self, weights: &Weights) -> DMatrix<f64> {
-        self.weights_of_profiles(weights, |shared| shared.radial)
-    }
-
-    /// Sums of the weights of each profile, times the part of the errors in plan by which they exceed a profile at
-    /// nadir of known attitude.
-    pub(super) fn farther_of_profiles(&self, weights: &Weights) -> DMatrix<f64> {
-        self.weights_of_profiles(weights, |shared| shared.farther_m() / PROFILE_PLAN_M)
-    }
-
-    /// Sums of the weights of each profile, one row per profile.
-    pub(super) fn sums_of_profiles(&self, weights: &Weights) -> DMatrix<f64> {
-        self.weights_of_profiles(weights, |_shared| 1.0)
+        let of_ones = solved.tr_mul(&self.of_ones);
+        self.factor.solve_mut(&mut solved);
+        ProfileSums { solved, of_ones }
     }
 
     /// Largest factors of the errors that shots of a profile share.
@@ -171,20 +269,5 @@ impl Kriging {
         shots.fold(SharedErrors::LEAST, |largest, shot| {
             largest.or_larger(&shot.shared)
         })
-    }
-
-    fn weights_of_profiles(
-        &self,
-        weights: &Weights,
-        factor: impl Fn(&SharedErrors) -> f64,
-    ) -> DMatrix<f64> {
-        let profiles = self.shots.iter().map(|shot| shot.profile + 1).max();
-        let places = weights.of_shots.ncols();
-        let mut sums = DMatrix::zeros(profiles.unwrap_or_default(), places);
-        for (shot, row) in self.shots.iter().zip(weights.of_shots.row_iter()) {
-            let mut sum = sums.row_mut(shot.profile);
-            sum += row * factor(&shot.shared);
-        }
-        sums
     }
 }

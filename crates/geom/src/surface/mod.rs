@@ -33,24 +33,22 @@
 //! # Ok::<(), areograph_geom::surface::SurfaceError>(())
 //! ```
 
-mod blocked_cholesky;
 mod crossovers;
 mod fractional_power;
 mod kriging;
 mod left_out;
 mod plan;
+mod prediction;
 mod profiles;
 mod shot;
 pub mod tails;
 mod variogram;
 mod withheld;
 
-use nalgebra::{DMatrix, Matrix3xX, Vector2, Vector3};
+use nalgebra::{Vector2, Vector3};
 
 use self::{
-    kriging::{Kriging, Weights},
-    plan::Plan,
-    shot::PROFILE_PLAN_M,
+    kriging::Kriging, plan::Plan, prediction::OfProfiles, shot::PROFILE_PLAN_M,
     variogram::Roughness,
 };
 use crate::ellipsoid::height_m;
@@ -58,6 +56,7 @@ use areograph_base::body::{Body, BodyModel};
 
 pub use crossovers::{Crossover, crossovers};
 pub use left_out::{LeftOut, ProfilePriors};
+pub use prediction::{MeanHeight, PlaceHeight, ProfileOnRelief, Relief, SurfaceHeights};
 pub use profiles::{ProfileNet, ProfileShift};
 pub use shot::{
     NADIR_MAX_RAD, SharedErrors, SurfaceShot, attitude_sigma_m, turned_sigmas_m, with_across_track,
@@ -132,56 +131,9 @@ pub enum SurfaceError {
 pub struct LaserSurface {
     plan: Plan,
     kriging: Kriging,
+    of_profiles: OfProfiles,
     roughness: Roughness,
     options: SurfaceOptions,
-}
-
-/// Heights of the surface at given points, above the ellipsoid along the radius.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SurfaceHeights {
-    /// Heights, metres.
-    pub heights_m: Vec<f64>,
-    /// Slopes towards east and north, metres per metre.
-    pub slopes: Vec<Vector2<f64>>,
-    /// Planimetric distance of the nearest shot, metres.
-    pub nearest_m: Vec<f64>,
-    /// Covariance of the errors of the heights, m²: one standard deviation contains 68 % of them; see [`tails`].
-    pub covariance_m2: DMatrix<f64>,
-    /// Covariance without the effect of planimetric errors on a slope, m².
-    pub without_plan_m2: DMatrix<f64>,
-    /// The body whose ellipsoid they refer to.
-    pub body: Body,
-    /// Planimetric information, where relief determines planimetry.
-    pub relief: Option<Relief>,
-}
-
-/// The information of heights over relief about planimetry.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Relief {
-    /// Change of each height with its position, metres per metre, Mars-fixed.
-    pub by_place: Vec<Vector3<f64>>,
-    /// The possible shift of each profile of the surface, one entry per profile.
-    pub profiles: Vec<ProfileOnRelief>,
-}
-
-/// Dependence of heights of the surface on the shift of one of its profiles.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ProfileOnRelief {
-    /// Index of the profile.
-    pub profile: usize,
-    /// Change of measured minus predicted heights when the profile is recorded farther to the east, to the north and
-    /// higher than its true position: one row per point.
-    pub by_shift: Matrix3xX<f64>,
-    /// Standard deviations of these shifts, metres.
-    pub sigma_m: Vector3<f64>,
-}
-
-impl SurfaceHeights {
-    /// Standard deviation of the height at `index`, metres.
-    #[must_use]
-    pub fn sigma_m(&self, index: usize) -> f64 {
-        self.covariance_m2[(index, index)].sqrt()
-    }
 }
 
 impl LaserSurface {
@@ -215,6 +167,7 @@ impl LaserSurface {
             .ok_or(SurfaceError::NotANumber)?;
         Ok(Self {
             plan,
+            of_profiles: OfProfiles::new(&kriging, options.uses_relief),
             kriging,
             roughness,
             options: *options,
@@ -230,10 +183,7 @@ impl LaserSurface {
     /// Profiles that shots of the surface belong to, by their indices, ascending.
     #[must_use]
     pub fn profiles(&self) -> Vec<usize> {
-        let mut profiles: Vec<usize> = self.kriging.shots.iter().map(|shot| shot.profile).collect();
-        profiles.sort_unstable();
-        profiles.dedup();
-        profiles
+        self.kriging.profiles()
     }
 
     /// Whether heights above it determine planimetry.
@@ -253,137 +203,6 @@ impl LaserSurface {
     #[must_use]
     pub fn height_m(&self, place_m: &Vector3<f64>) -> (f64, Vector3<f64>) {
         height_m(self.options.body.model(), place_m)
-    }
-
-    /// Heights of the surface at `places_m`, with the covariance of their errors.
-    #[must_use]
-    pub fn predict(&self, places_m: &[Vector3<f64>]) -> SurfaceHeights {
-        let at: Vec<Vector2<f64>> = places_m.iter().map(|place| self.plan.of(place)).collect();
-        let weights = self.kriging.weights(&at);
-        let slopes: Vec<Vector2<f64>> = at.iter().map(|place| self.slope(place)).collect();
-        let mut covariance_m2 = self.errors_m2(&at);
-        let of_profiles = self.kriging.radial_of_profiles(&weights);
-        covariance_m2 += of_profiles.tr_mul(&of_profiles) * self.options.profile_sigma_m.powi(2);
-        let without_plan_m2 = covariance_m2.clone();
-        let relief = self.options.uses_relief.then(|| Relief {
-            by_place: places_m
-                .iter()
-                .zip(&slopes)
-                .map(|(place, slope)| self.plan.by_place(place, slope))
-                .collect(),
-            profiles: self.on_relief(&slopes, &weights),
-        });
-        if let Some(relief) = &relief {
-            for profile in &relief.profiles {
-                let mut in_plan = profile.by_shift.clone();
-                in_plan.row_mut(2).fill(0.0);
-                covariance_m2 += in_plan.tr_mul(&in_plan) * profile.sigma_m.x.powi(2);
-            }
-        } else {
-            let slopes_matrix = DMatrix::from_fn(2, at.len(), |axis, place| slopes[place][axis]);
-            covariance_m2 +=
-                slopes_matrix.tr_mul(&slopes_matrix) * self.options.plan_sigma_m.powi(2);
-            // Profiles that are farther from their place than others, each by itself: the part of the shift that all shots of a
-            // profile share. The noise of these shots contains the same shift as independent errors.
-            let farther = self.kriging.farther_of_profiles(&weights);
-            for profile in farther
-                .row_iter()
-                .filter(|profile| profile.iter().any(|of| of.abs() > 0.0))
-            {
-                let by_shift = DMatrix::from_fn(2, at.len(), |axis, place| {
-                    slopes[place][axis] * profile[place]
-                });
-                covariance_m2 += by_shift.tr_mul(&by_shift) * PROFILE_PLAN_M.powi(2);
-            }
-        }
-        SurfaceHeights {
-            body: self.options.body,
-            without_plan_m2,
-            relief,
-            heights_m: at
-                .iter()
-                .map(|place| self.kriging.height_m(place))
-                .collect(),
-            nearest_m: at
-                .iter()
-                .map(|place| self.kriging.nearest_m(place))
-                .collect(),
-            slopes,
-            covariance_m2,
-        }
-    }
-
-    /// Each profile by its share in the heights, of `weights`.
-    fn on_relief(&self, slopes: &[Vector2<f64>], weights: &Weights) -> Vec<ProfileOnRelief> {
-        let of_profiles = self.kriging.sums_of_profiles(weights);
-        let by_shift = |profile: usize| {
-            Matrix3xX::from_fn(slopes.len(), |axis, place| {
-                let shift = if axis < 2 { slopes[place][axis] } else { -1.0 };
-                of_profiles[(profile, place)] * shift
-            })
-        };
-        let profiles = self.profiles().into_iter();
-        profiles
-            .map(|profile| {
-                let shared = self.kriging.shared_of(profile);
-                let (plan_m, radial_m) = (
-                    shared.plan * self.options.profile_plan_sigma_m,
-                    shared.radial * self.options.profile_sigma_m,
-                );
-                ProfileOnRelief {
-                    profile,
-                    by_shift: by_shift(profile),
-                    sigma_m: Vector3::new(plan_m, plan_m, radial_m),
-                }
-            })
-            .collect()
-    }
-
-    /// Covariance of the errors of the surface at the possible true positions, without errors that shots of a profile
-    /// share: a planimetric error moves a point away from a profile, where the ground is known, as well as towards one.
-    fn errors_m2(&self, at: &[Vector2<f64>]) -> DMatrix<f64> {
-        let shift_m = std::f64::consts::SQRT_2 * self.options.plan_sigma_m;
-        let all_around = [
-            Vector2::new(shift_m, 0.0),
-            Vector2::new(-shift_m, 0.0),
-            Vector2::new(0.0, shift_m),
-            Vector2::new(0.0, -shift_m),
-        ];
-        let shifts = if shift_m > 0.0 {
-            &all_around[..]
-        } else {
-            &[Vector2::zeros()]
-        };
-        let profile_m2 = self.options.profile_sigma_m.powi(2);
-        let mut covariance_m2 = DMatrix::zeros(at.len(), at.len());
-        for shift in shifts {
-            let shifted: Vec<Vector2<f64>> = at.iter().map(|place| place + shift).collect();
-            let weights = self.kriging.weights(&shifted);
-            let of_profiles = self.kriging.radial_of_profiles(&weights);
-            covariance_m2 += self.kriging.covariance_m2(&shifted, &weights)
-                - of_profiles.tr_mul(&of_profiles) * profile_m2;
-        }
-        covariance_m2 /= shifts.len() as f64;
-        // Rougher ground deviates more from the same interpolation.
-        let shares: Vec<f64> = at.iter().map(|place| self.roughness.share(place)).collect();
-        for (column, of_column) in shares.iter().enumerate() {
-            for (row, of_row) in shares.iter().enumerate() {
-                covariance_m2[(row, column)] *= of_row * of_column;
-            }
-        }
-        covariance_m2
-    }
-
-    fn slope(&self, place: &Vector2<f64>) -> Vector2<f64> {
-        let along = |step: Vector2<f64>| {
-            let [after_m, before_m] =
-                [place + step, place - step].map(|place| self.kriging.height_m(&place));
-            (after_m - before_m) / (2.0 * GRADIENT_STEP_M)
-        };
-        Vector2::new(
-            along(Vector2::new(GRADIENT_STEP_M, 0.0)),
-            along(Vector2::new(0.0, GRADIENT_STEP_M)),
-        )
     }
 }
 

@@ -4,6 +4,7 @@ use super::*;
 use crate::ellipsoid::on_ellipsoid_m;
 use areograph_base::body::Body;
 use areograph_base::body::MARS_IAU2000;
+use nalgebra::DMatrix;
 
 /// Shots along a meridian from the equator northwards, `spacing_m` apart, with these heights.
 fn profile(heights_m: &[f64], spacing_m: f64, east_m: f64, profile: usize) -> Vec<SurfaceShot> {
@@ -85,6 +86,28 @@ fn a_constant_comes_back_and_so_does_what_is_added_to_all_shots() {
     }
 }
 
+/// Weights of ordinary kriging by its equations as Cressie states them, with a multiplier: one column per place.
+fn weights(surface: &LaserSurface, at: &[Vector2<f64>]) -> DMatrix<f64> {
+    let (shots, gamma) = (&surface.kriging.shots, surface.variogram());
+    let count = shots.len();
+    let equations = DMatrix::from_fn(count + 1, count + 1, |row, column| {
+        match (shots.get(row), shots.get(column)) {
+            (Some(one), Some(other)) if row == column => {
+                -1.0 - 2.0 * gamma.at(one.shared.farther_m())
+                    - gamma.between(&one.plan_m, &other.plan_m)
+            }
+            (Some(one), Some(other)) => gamma.between(&one.plan_m, &other.plan_m),
+            (None, None) => 0.0,
+            _ => 1.0,
+        }
+    });
+    let right = DMatrix::from_fn(count + 1, at.len(), |row, place| {
+        let shot = shots.get(row);
+        shot.map_or(1.0, |shot| gamma.between(&shot.plan_m, &at[place]))
+    });
+    equations.lu().solve(&right).unwrap()
+}
+
 #[test]
 fn the_covariance_is_the_full_expression_symmetric_and_positive_definite() {
     let mut shots = profile(&zigzag(40, 9.0), 305.0, 0.0, 0);
@@ -104,12 +127,13 @@ fn the_covariance_is_the_full_expression_symmetric_and_positive_definite() {
         })
         .collect();
     let at: Vec<Vector2<f64>> = places.iter().map(|place| surface.plan.of(place)).collect();
-    let weights = surface.kriging.weights(&at);
-    let quick = surface.kriging.covariance_m2(&at, &weights);
     let (kriging, gamma) = (&surface.kriging, surface.variogram());
-    let solved = weights.of_shots();
+    let relation = kriging.at(&at);
+    let mut quick = kriging.between_m2(&at);
+    kriging.add_errors_m2(&mut quick, relation);
+    quick.fill_upper_triangle_with_lower_triangle();
+    let solved = weights(&surface, &at);
     for (i, one) in at.iter().enumerate() {
-        assert!((solved.column(i).sum() - 1.0).abs() < 1e-9);
         for (j, other) in at.iter().enumerate() {
             let mut full = -gamma.between(one, other);
             for (k, shot) in kriging.shots.iter().enumerate() {
@@ -132,6 +156,46 @@ fn the_covariance_is_the_full_expression_symmetric_and_positive_definite() {
         }
     }
     assert!(nalgebra::Cholesky::new(quick.clone()).is_some());
+}
+
+#[test]
+fn places_alone_and_their_mean_have_the_errors_of_the_whole() {
+    // The second profile is farther from its place than others, and its shots share larger errors; a third is rougher.
+    let mut shots = profile(&zigzag(60, 9.0), 305.0, 0.0, 2);
+    let second = profile(&zigzag(60, 7.0), 311.0, 2_500.0, 5).into_iter();
+    shots.extend(second.map(|shot| SurfaceShot {
+        attitude_known: false,
+        ..shot
+    }));
+    shots.extend(profile(&zigzag(60, 30.0), 300.0, 9_000.0, 7));
+    // More places than one task predicts.
+    let places: Vec<Vector3<f64>> = (0..150)
+        .map(|tie| place(70.0 * f64::from(tie), 4_000.0 + 43.0 * f64::from(tie), 0.0))
+        .collect();
+    let relief = SurfaceOptions {
+        uses_relief: true,
+        ..SurfaceOptions::default()
+    };
+    for options in [SurfaceOptions::default(), relief, only_ground(4.0)] {
+        let surface = LaserSurface::new(&shots, &[], &options).unwrap();
+        let whole = surface.predict(&places);
+        let each = surface.predict_each(&places);
+        assert_eq!(each.len(), places.len());
+        for (index, of) in each.iter().enumerate() {
+            // Metres, and shares: rounding of 1e5 m² of ground in variances of 1 to 1e4 m².
+            assert!((of.height_m - whole.heights_m[index]).abs() < 1e-8);
+            assert!((of.sigma_m / whole.sigma_m(index) - 1.0).abs() < 1e-9);
+            assert!((of.nearest_m - whole.nearest_m[index]).abs() < 1e-8);
+            assert!((of.slope - whole.slopes[index]).norm() < 1e-9);
+        }
+        let mean = surface.predict_mean(&places);
+        let count = places.len() as f64;
+        let heights_m: f64 = whole.heights_m.iter().sum();
+        assert!((mean.height_m - heights_m / count).abs() < 1e-8);
+        let variance_m2 = whole.covariance_m2.sum() / (count * count);
+        assert!((mean.variance_m2 / variance_m2 - 1.0).abs() < 1e-9);
+        assert!(nalgebra::Cholesky::new(whole.covariance_m2).is_some());
+    }
 }
 
 #[test]

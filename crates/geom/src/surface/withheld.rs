@@ -190,29 +190,21 @@ fn predicted(
     let nearest: Vec<SurfaceShot> = nearest.into_iter().map(|index| shots[index]).collect();
     let surface = LaserSurface::new(&nearest, &[], options).ok()?;
     let places_m: Vec<Vector3<f64>> = stretch.iter().map(|shot| shot.ground_m).collect();
-    let found = surface.predict(&places_m);
+    let found = surface.predict_mean(&places_m);
     let count = places_m.len() as f64;
-    let measured = places_m
+    let measured_m = places_m
         .iter()
         .map(|place_m| height_m(options.body.model(), place_m).0);
-    let above_m = measured
-        .zip(&found.heights_m)
-        .map(|(height_m, predicted_m)| height_m - predicted_m);
     let shared = stretch[0].shared(options.profile_sigma_m);
     let own_m2 = options.shot_sigma_m.powi(2) + 2.0 * surface.variogram().at(shared.farther_m());
-    let variance_m2 = found.covariance_m2.sum() / (count * count)
-        + own_m2 / count
-        + (options.profile_sigma_m * shared.radial).powi(2);
+    let variance_m2 =
+        found.variance_m2 + own_m2 / count + (options.profile_sigma_m * shared.radial).powi(2);
     Some(Withheld {
         profile,
         first: from,
         shots: stretch.len(),
-        above_m: above_m.sum::<f64>() / count,
+        above_m: measured_m.sum::<f64>() / count - found.height_m,
         sigma_m: variance_m2.sqrt(),
-        nearest_m: found
-            .nearest_m
-            .iter()
-            .copied()
-            .fold(f64::INFINITY, f64::min),
+        nearest_m: surface.nearest_m(&places_m),
     })
 }

@@ -8,7 +8,7 @@ use rusqlite::{Connection, OpenFlags, params, params_from_iter, types::Value};
 
 use crate::{
     error::ProductError,
-    files::{create, finish, open},
+    files::{create, finish},
     footprints::features,
     gis::{Features, crs_wkt},
     product::{Content, Declaration, Program, Role, Use, Write},
@@ -73,10 +73,6 @@ pub(crate) fn write(path: &Path, features: Features) -> Result<u64> {
     // Makes the folder and an empty file, which SQLite takes for a new database.
     finish(path, create(path)?)?;
     fill(path, &features).in_file(path)?;
-    open(path)?
-        .sync_all()
-        .map_err(IoError::on("write"))
-        .in_file(path)?;
     read_back(path, &features).in_file(path)?;
     Ok(features.points.len() as u64)
 }

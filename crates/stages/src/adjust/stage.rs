@@ -50,7 +50,7 @@ stage_inputs! {
 
 impl Stage for Adjust<'_> {
     const NAME: &'static str = "adjust";
-    const METHOD: u32 = 17;
+    const METHOD: u32 = 18;
     type Output = Adjusted;
     stage_inputs!(fingerprint);
 

@@ -14,7 +14,7 @@ const COLUMNS: usize = 64;
 /// # Source
 /// Golub and Van Loan, Matrix Computations, sections 3.1.4 and 4.2.6.
 #[derive(Debug, Clone)]
-pub(super) struct BlockedCholesky {
+pub(crate) struct BlockedCholesky {
     /// Its lower triangle is the factor.
     l: DMatrix<f64>,
     /// Inverses of the blocks of its diagonal.
@@ -23,7 +23,7 @@ pub(super) struct BlockedCholesky {
 
 impl BlockedCholesky {
     /// The factor of a symmetric matrix, whose lower triangle is read; `None` where it is not positive definite.
-    pub(super) fn new(mut matrix: DMatrix<f64>) -> Option<Self> {
+    pub(crate) fn new(mut matrix: DMatrix<f64>) -> Option<Self> {
         let rows = matrix.nrows();
         let mut inverses = Vec::with_capacity(rows.div_ceil(BLOCK));
         for start in (0..rows).step_by(BLOCK) {
@@ -59,27 +59,46 @@ impl BlockedCholesky {
     }
 
     /// Solves `A x = b` for every column of `b`, in its place.
-    pub(super) fn solve_mut(&self, b: &mut DMatrix<f64>) {
-        let rows = b.nrows();
-        let columns = b.as_mut_slice().par_chunks_mut(COLUMNS * rows.max(1));
-        columns.for_each(|columns| {
-            let width = columns.len() / rows;
-            self.solve_columns(DMatrixViewMut::from_slice(columns, rows, width));
+    pub(crate) fn solve_mut(&self, b: &mut DMatrix<f64>) {
+        in_pieces(b, |mut columns| {
+            self.solve_lower(&mut columns);
+            self.solve_upper(&mut columns);
         });
     }
 
+    /// Solves `L y = b` for every column of `b`, in its place: `yᵀ y` is `bᵀ A⁻¹ b`.
+    pub(crate) fn solve_lower_mut(&self, b: &mut DMatrix<f64>) {
+        in_pieces(b, |mut columns| self.solve_lower(&mut columns));
+    }
+
     /// The solution of `A x = b`.
-    pub(super) fn solve(&self, b: &DVector<f64>) -> DVector<f64> {
+    pub(crate) fn solve(&self, b: &DVector<f64>) -> DVector<f64> {
         let mut solution = b.clone();
         let rows = solution.len();
-        self.solve_columns(DMatrixViewMut::from_slice(solution.as_mut_slice(), rows, 1));
+        let mut column = DMatrixViewMut::from_slice(solution.as_mut_slice(), rows, 1);
+        self.solve_lower(&mut column);
+        self.solve_upper(&mut column);
         solution
     }
 
-    fn solve_columns(&self, mut b: DMatrixViewMut<'_, f64>) {
+    /// The inverse of `A`.
+    pub(crate) fn inverse(&self) -> DMatrix<f64> {
+        let rows = self.l.nrows();
+        let mut inverse = DMatrix::identity(rows, rows);
+        self.solve_mut(&mut inverse);
+        inverse
+    }
+
+    fn blocks(&self) -> impl DoubleEndedIterator<Item = (usize, &DMatrix<f64>)> {
+        self.inverses
+            .iter()
+            .enumerate()
+            .map(|(block, inverse)| (block * BLOCK, inverse))
+    }
+
+    fn solve_lower(&self, b: &mut DMatrixViewMut<'_, f64>) {
         let rows = b.nrows();
-        let blocks = || self.inverses.iter().zip((0..rows).step_by(BLOCK));
-        for (inverse, start) in blocks() {
+        for (start, inverse) in self.blocks() {
             let rest = start + inverse.nrows();
             let (mut block, mut below) = b.rows_range_pair_mut(start..rest, rest..rows);
             let solved = inverse * &block;
@@ -87,7 +106,10 @@ impl BlockedCholesky {
             let factors = self.l.view((rest, start), (rows - rest, rest - start));
             below.gemm(-1.0, &factors, &solved, 1.0);
         }
-        for (inverse, start) in blocks().rev() {
+    }
+
+    fn solve_upper(&self, b: &mut DMatrixViewMut<'_, f64>) {
+        for (start, inverse) in self.blocks().rev() {
             let size = inverse.nrows();
             let (mut above, mut block) = b.rows_range_pair_mut(0..start, start..start + size);
             let solved = inverse.transpose() * &block;
@@ -96,6 +118,39 @@ impl BlockedCholesky {
             above.gemm(-1.0, &factors.transpose(), &solved, 1.0);
         }
     }
+}
+
+/// Works on the columns of `b`, some at a time, on all threads.
+fn in_pieces(b: &mut DMatrix<f64>, work: impl Fn(DMatrixViewMut<'_, f64>) + Sync) {
+    let rows = b.nrows();
+    let pieces = b.as_mut_slice().par_chunks_mut(COLUMNS * rows.max(1));
+    pieces.for_each(|columns| {
+        let width = columns.len() / rows;
+        work(DMatrixViewMut::from_slice(columns, rows, width));
+    });
+}
+
+/// Adds `factor · rowsᵀ rows` to the lower triangle of `sum`, whose other elements are then undefined.
+pub(crate) fn add_square(sum: &mut DMatrix<f64>, factor: f64, rows: &DMatrix<f64>) {
+    let size = sum.nrows();
+    if size == 0 || rows.nrows() == 0 {
+        return;
+    }
+    // `tr_mul` takes seven times as long as a product with the transpose.
+    let transposed = rows.transpose();
+    let columns = sum.as_mut_slice().par_chunks_mut(BLOCK * size);
+    columns.enumerate().for_each(|(index, columns)| {
+        let first = index * BLOCK;
+        let width = columns.len() / size;
+        DMatrixViewMut::from_slice(columns, size, width)
+            .rows_mut(first, size - first)
+            .gemm(
+                factor,
+                &transposed.rows(first, size - first),
+                &rows.columns(first, width),
+                1.0,
+            );
+    });
 }
 
 #[cfg(test)]
@@ -117,6 +172,16 @@ mod tests {
             factor.solve_mut(&mut solution);
             // Condition about 1e4 times rounding.
             let error = (&matrix * solution - &right).amax() / right.amax();
+            assert!(error < 1e-10, "{rows}: {error}");
+            let inverse = factor.inverse();
+            assert!((&matrix * &inverse - DMatrix::identity(rows, rows)).amax() < 1e-10);
+            // Half a solution gives the square of a whole one.
+            let mut half = right.clone();
+            factor.solve_lower_mut(&mut half);
+            let mut square = DMatrix::zeros(columns, columns);
+            add_square(&mut square, 2.0, &half);
+            let whole = 2.0 * right.transpose() * inverse * &right;
+            let error = (square - &whole).lower_triangle().amax() / whole.amax();
             assert!(error < 1e-10, "{rows}: {error}");
             let only = right.column(0).into_owned();
             let error = (&matrix * factor.solve(&only) - &only).amax() / right.amax();
