@@ -38,6 +38,7 @@ mod gaps;
 mod kernels;
 mod leap_seconds;
 mod metakernel;
+mod mounting;
 mod needs;
 mod origin;
 mod role;

@@ -172,7 +172,7 @@ impl StageCache {
         };
         let head = postcard::to_stdvec(&head).map_err(unstorable)?;
         let path = self.path(label);
-        atomic::write_parts(&path, &[&head, &payload]).in_file(&path)?;
+        atomic::write_unflushed(&path, &[&head, &payload]).in_file(&path)?;
         self.own.forget(&path);
         Ok(Output::known(label.to_owned(), value, provenance))
     }
@@ -228,17 +228,22 @@ fn read_head(file: &mut File) -> Option<(Head, u64)> {
 
 /// The output in the file `path` if its hash is `blake3`.
 fn read_output<T: DeserializeOwned>(path: &Path, blake3: &str) -> Option<T> {
-    let bytes = fs::read(path).ok()?;
-    let (_, payload): (Head, &[u8]) = postcard::take_from_bytes(&bytes).ok()?;
-    let intact = *blake3::hash(payload).to_hex() == *blake3;
-    intact.then(|| read(payload))?
+    let (head, value) = read_intact(path)?;
+    (head.blake3 == blake3).then_some(value)
 }
 
 /// The output of the stage with this label in the cache `folder`, whatever its inputs were.
 pub(super) fn stored<T: DeserializeOwned>(folder: &Path, label: &str) -> Option<T> {
-    let bytes = fs::read(path_in(folder, label)).ok()?;
-    let (_, payload): (Head, &[u8]) = postcard::take_from_bytes(&bytes).ok()?;
-    read(payload)
+    read_intact(&path_in(folder, label)).map(|(_, value)| value)
+}
+
+/// Header and output in the file `path`, if the output has the hash that its header states.
+fn read_intact<T: DeserializeOwned>(path: &Path) -> Option<(Head, T)> {
+    let bytes = fs::read(path).ok()?;
+    let (head, payload): (Head, &[u8]) = postcard::take_from_bytes(&bytes).ok()?;
+    let intact = *blake3::hash(payload).to_hex() == *head.blake3;
+    let value = intact.then(|| read(payload))??;
+    Some((head, value))
 }
 
 /// An output, if these bytes are exactly its stored form.
@@ -334,6 +339,30 @@ mod tests {
         let at_once = StageCache::new(folder.path(), false);
         let damaged = at_once.load::<Vec<u32>>("search", &Inputs::new(1));
         assert_eq!(damaged.err(), Some(Reason::Damaged));
+    }
+
+    #[test]
+    fn an_output_that_a_power_failure_left_incomplete_is_damaged() {
+        let folder = tempfile::tempdir().unwrap();
+        let heights: Vec<u32> = (0..1 << 16).collect();
+        let cache = StageCache::new(folder.path(), false);
+        cache.store("search", Inputs::new(1), heights).unwrap();
+        let path = folder.path().join("search");
+        let whole = fs::read(&path).unwrap();
+        let half = whole.len() / 2;
+        let zeros = |kept: usize| [&whole[..kept], &vec![0; whole.len() - kept]].concat();
+        let left = [Vec::new(), whole[..half].to_vec(), zeros(half), zeros(0)];
+        for bytes in left {
+            fs::write(&path, &bytes).unwrap();
+            // Read at once, and on demand.
+            let on_demand =
+                StageCache::new(folder.path(), false).knowing(InputFiles::default());
+            for cache in [&cache, &on_demand] {
+                let loaded = cache.load::<Vec<u32>>("search", &Inputs::new(1));
+                assert_eq!(loaded.err(), Some(Reason::Damaged));
+            }
+            assert_eq!(stored::<Vec<u32>>(folder.path(), "search"), None);
+        }
     }
 
     #[test]

@@ -53,6 +53,8 @@ struct Seen {
     files: BTreeMap<PathBuf, SeenFile>,
     /// Hashes of contents that passed a check of kernels, with its version.
     passed: BTreeSet<(String, u32)>,
+    /// Findings that have been stored for later runs.
+    kept: Vec<KnownFile>,
 }
 
 /// A file that the run has read or hashed.
@@ -214,6 +216,16 @@ impl InputFiles {
         let mut learnt = self.findings();
         learnt.retain(|file| self.earlier.get(&file.identity) != Some(file));
         learnt
+    }
+
+    /// Whether exactly these findings have been stored for later runs.
+    pub(super) fn has_kept(&self, learnt: &[KnownFile]) -> bool {
+        self.lock().kept == learnt
+    }
+
+    /// Records that these findings have been stored for later runs.
+    pub(super) fn note_kept(&self, learnt: Vec<KnownFile>) {
+        self.lock().kept = learnt;
     }
 
     /// Findings that later runs need not repeat.

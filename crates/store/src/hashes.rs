@@ -86,14 +86,16 @@ impl HashCache {
         read(&self.path).unwrap_or_default()
     }
 
-    /// Adds the findings of a run about its input files. Nothing is stored if the folder does not exist.
+    /// Adds the findings of a run about its input files, unless it has added the same before. Nothing is stored if the
+    /// folder does not exist.
     pub fn keep(&self, files: &InputFiles) {
         let learnt = files.learnt();
-        if learnt.is_empty() || !self.folder().is_dir() {
+        if learnt.is_empty() || files.has_kept(&learnt) || !self.folder().is_dir() {
             return;
         }
-        if let Err(failure) = self.add(&learnt) {
-            tracing::warn!("hashes of input files cannot be stored: {failure}");
+        match self.add(&learnt) {
+            Ok(()) => files.note_kept(learnt),
+            Err(failure) => tracing::warn!("hashes of input files cannot be stored: {failure}"),
         }
     }
 
@@ -132,7 +134,7 @@ impl HashCache {
             known.add(*file);
         }
         match encoded(known.iter().copied().collect()) {
-            Some(bytes) => atomic::replace(&self.path, &bytes, MARK),
+            Some(bytes) => atomic::replace_unflushed(&self.path, &bytes, MARK),
             None => Ok(()),
         }
     }

@@ -90,9 +90,18 @@ impl StagedFile {
     /// The disk is full or refuses, or a foreign file has received the name meanwhile; an existing file of this name is
     /// then unchanged.
     pub fn finish(self) -> Result<()> {
+        let synced = self.temporary.as_file().sync_all();
+        synced.map_err(IoError::on("write")).in_file(&self.path)?;
+        self.finish_unflushed()
+    }
+
+    /// As [`Self::finish`], but leaves it to the system when the content reaches the disk: after a power failure, the
+    /// file may be incomplete under its name. Only for files whose readers verify a hash of the content.
+    ///
+    /// # Errors
+    /// As [`Self::finish`].
+    pub fn finish_unflushed(self) -> Result<()> {
         let file = self.temporary.as_file();
-        let synced = file.sync_all().map_err(IoError::on("write"));
-        synced.in_file(&self.path)?;
         let readable = make_readable(file).map_err(IoError::on("set permissions of"));
         readable.in_file(&self.path)?;
         if let Some(mark) = &self.mark {

@@ -1,6 +1,7 @@
 //! The exterior orientation of an image, whether sampled from kernels or corrected.
 
 mod centre;
+mod interpolation;
 mod light_time;
 mod reader;
 mod support;
@@ -13,8 +14,8 @@ pub use centre::SeenFromCentre;
 pub(crate) use light_time::RayOrigin;
 pub use light_time::{LightTimeEffect, OtherConvention};
 pub(crate) use reader::CameraReader;
-pub(crate) use tables::{Camera, Nodes};
 pub use tables::{CameraTables, InterpolationCheck};
+pub(crate) use tables::{Camera, Nodes};
 
 use crate::tag_times::ImageTimes;
 use areograph_base::{
