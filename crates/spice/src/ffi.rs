@@ -207,22 +207,39 @@ impl Cspice {
         self.check("spkgeo_c").map(|()| state)
     }
 
-    /// `spkez_c` with `LT+S`: apparent state of `target` seen from `observer` in J2000.
-    pub(super) fn apparent_state(&self, target: i32, et: f64, observer: i32) -> Called<StateKm> {
-        let (mut state, mut light_time_s) = ([0.0; 6], 0.0);
+    /// `spkssb_c`: geometric state of `target` relative to the barycentre of the solar system in J2000.
+    pub(super) fn barycentric_state(&self, target: i32, et: f64) -> Called<StateKm> {
+        let mut state = [0.0; 6];
         // SAFETY: the lock is held; `state` holds the six doubles that are written.
+        unsafe { naif::spkssb_c(target, et, c"J2000".as_ptr().cast_mut(), state.as_mut_ptr()) };
+        self.check("spkssb_c").map(|()| state)
+    }
+
+    /// `spkaps_c` with `LT+S`: apparent state of `target` in J2000, seen from an observer with this barycentric state and
+    /// acceleration, km/s².
+    pub(super) fn apparent_state(
+        &self,
+        target: i32,
+        et: f64,
+        mut observer: StateKm,
+        mut acceleration: [f64; 3],
+    ) -> Called<StateKm> {
+        let (mut state, mut light_time_s, mut light_time_rate) = ([0.0; 6], 0.0, 0.0);
+        // SAFETY: the lock is held; the arrays have the sizes that are read and written.
         unsafe {
-            naif::spkez_c(
+            naif::spkaps_c(
                 target,
                 et,
                 c"J2000".as_ptr().cast_mut(),
                 c"LT+S".as_ptr().cast_mut(),
-                observer,
+                observer.as_mut_ptr(),
+                acceleration.as_mut_ptr(),
                 state.as_mut_ptr(),
                 &raw mut light_time_s,
+                &raw mut light_time_rate,
             );
         }
-        self.check("spkez_c").map(|()| state)
+        self.check("spkaps_c").map(|()| state)
     }
 
     /// `pxform_c`: matrix from one frame to another.

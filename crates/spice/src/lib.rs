@@ -30,6 +30,7 @@
 //!
 //! `examples/state.rs` shows the state of the spacecraft at an instant.
 
+mod apparent;
 mod coverage;
 mod daf;
 mod error;

@@ -12,6 +12,7 @@ use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::{
+    apparent::MarsAcceleration,
     coverage::Coverage,
     error::SpiceError,
     ffi::{Cspice, Rows, StateKm},
@@ -96,6 +97,7 @@ struct Loaded {
     /// In the order of [`Spacecraft::all`].
     coverages: Vec<OnceCell<Coverage>>,
     mountings: FixedMountings,
+    mars_acceleration: MarsAcceleration,
 }
 
 impl Session {
@@ -113,6 +115,7 @@ impl Session {
             kernels: kernels.clone(),
             coverages: vec![OnceCell::new(); Spacecraft::all().len()],
             mountings: FixedMountings::default(),
+            mars_acceleration: MarsAcceleration::default(),
         };
         Ok(Self {
             loaded: Rc::new(loaded),
@@ -141,6 +144,10 @@ impl Session {
 
     pub(super) fn mountings(&self) -> &FixedMountings {
         &self.loaded.mountings
+    }
+
+    pub(super) fn mars_acceleration(&self) -> &MarsAcceleration {
+        &self.loaded.mars_acceleration
     }
 
     /// The version of CSPICE, for example `CSPICE_N0067`.
@@ -243,9 +250,7 @@ impl Session {
     /// # Errors
     /// As [`Self::state`].
     pub fn apparent_state(&self, et: Et) -> Result<State> {
-        let state = self
-            .cspice()
-            .apparent_state(self.spacecraft.naif, et.seconds(), NAIF_MARS)?;
+        let state = self.orbiter_seen_from_mars(self.spacecraft.naif, et.seconds())?;
         self.finite(
             "apparent position or velocity",
             &self.spacecraft.name,
@@ -271,8 +276,7 @@ impl Session {
     /// [`SpiceError::NoSun`] when the kernels do not hold the Sun when its light left; as [`Self::state`].
     pub fn sun_state(&self, et: Et) -> Result<State> {
         let state = self
-            .cspice()
-            .apparent_state(NAIF_SUN, et.seconds(), NAIF_MARS)
+            .seen_from_mars(NAIF_SUN, et.seconds())
             .map_err(|error| {
                 if error.is_coverage() {
                     let utc = self.et_to_utc(et).unwrap_or_else(|_| "unknown".to_owned());

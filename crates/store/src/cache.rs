@@ -355,8 +355,7 @@ mod tests {
         for bytes in left {
             fs::write(&path, &bytes).unwrap();
             // Read at once, and on demand.
-            let on_demand =
-                StageCache::new(folder.path(), false).knowing(InputFiles::default());
+            let on_demand = StageCache::new(folder.path(), false).knowing(InputFiles::default());
             for cache in [&cache, &on_demand] {
                 let loaded = cache.load::<Vec<u32>>("search", &Inputs::new(1));
                 assert_eq!(loaded.err(), Some(Reason::Damaged));

@@ -14,8 +14,8 @@ pub use centre::SeenFromCentre;
 pub(crate) use light_time::RayOrigin;
 pub use light_time::{LightTimeEffect, OtherConvention};
 pub(crate) use reader::CameraReader;
-pub use tables::{CameraTables, InterpolationCheck};
 pub(crate) use tables::{Camera, Nodes};
+pub use tables::{CameraTables, InterpolationCheck};
 
 use crate::tag_times::ImageTimes;
 use areograph_base::{
