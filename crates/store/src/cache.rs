@@ -342,7 +342,7 @@ mod tests {
     }
 
     #[test]
-    fn an_output_that_a_power_failure_left_incomplete_is_damaged() {
+    fn an_output_that_a_power_failure_left_incomplete_is_not_used() {
         let folder = tempfile::tempdir().unwrap();
         let heights: Vec<u32> = (0..1 << 16).collect();
         let cache = StageCache::new(folder.path(), false);
@@ -357,8 +357,10 @@ mod tests {
             // Read at once, and on demand.
             let on_demand = StageCache::new(folder.path(), false).knowing(InputFiles::default());
             for cache in [&cache, &on_demand] {
+                // Zeros are a header of other inputs.
                 let loaded = cache.load::<Vec<u32>>("search", &Inputs::new(1));
-                assert_eq!(loaded.err(), Some(Reason::Damaged));
+                let reason = loaded.err().unwrap();
+                assert!(matches!(reason, Reason::Damaged | Reason::Changed(_)));
             }
             assert_eq!(stored::<Vec<u32>>(folder.path(), "search"), None);
         }

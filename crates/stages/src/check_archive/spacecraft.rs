@@ -40,6 +40,11 @@ impl FrameSpacecraft {
 /// Time between the states of the grid, seconds, and how many of them give a state between.
 const GRID_S: f64 = 4.0;
 const GRID_STATES: usize = 6;
+/// Steps from the first of them to the last one at or before an instant, and to the last.
+const GRID_BEFORE: i64 = 2;
+const GRID_LAST: i64 = 5;
+/// Largest number of a state: of times thirty million years away, which a spoiled record may state.
+const GRID_END: f64 = 2.5e14;
 
 /// States at whole multiples of [`GRID_S`], each computed once for times in order.
 pub(super) struct StateGrid<'a> {
@@ -68,12 +73,12 @@ impl<'a> StateGrid<'a> {
     /// 1e-9 m: the sixth derivative of an orbit of 3,800 km in the rotating frame of Mars is 3e-12 m/s⁶.
     fn state(&mut self, at: Et) -> Option<SpacecraftState> {
         let place = at.seconds() / GRID_S;
-        // The trajectory covers no time at which this saturates.
-        #[allow(
-            clippy::cast_possible_truncation,
-            reason = "saturates, and NaN becomes 0"
-        )]
-        let first = place.floor() as i64 - (GRID_STATES as i64 / 2 - 1);
+        // Written so that NaN does not count as within.
+        if !(place.abs() < GRID_END) {
+            return state(at, self.trajectory);
+        }
+        #[allow(clippy::cast_possible_truncation, reason = "a number below GRID_END")]
+        let first = place.floor() as i64 - GRID_BEFORE;
         self.move_to(first);
         let late = place - first as f64;
         match self.states {
@@ -92,10 +97,9 @@ impl<'a> StateGrid<'a> {
         let known = (self.first, self.states);
         self.first = first;
         let at = |number: i64| Et::from_seconds(number as f64 * GRID_S);
-        let last = first.saturating_add(GRID_STATES as i64 - 1);
         self.is_smooth = self
             .trajectory
-            .is_smooth_over(Interval::new(at(first), at(last)));
+            .is_smooth_over(Interval::new(at(first), at(first + GRID_LAST)));
         for (slot, number) in self.states.iter_mut().zip(first..) {
             let of_known = number
                 .checked_sub(known.0)
