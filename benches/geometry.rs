@@ -42,8 +42,10 @@ fn rate(points_m: &[Vector3<f64>], solve: &Solve<'_>) -> f64 {
 fn main() {
     let model = GUSEV.euler(2);
     let vector = GUSEV.rotation_vector();
-    let newton = Projector::new(&model, f64::from(GUSEV.lines)).unwrap();
-    let newton_vector = Projector::new(&vector, f64::from(GUSEV.lines)).unwrap();
+    let newton = Projector::new(&model, f64::from(GUSEV.lines));
+    let newton = newton.unwrap().anchored();
+    let newton_vector = Projector::new(&vector, f64::from(GUSEV.lines));
+    let newton_vector = newton_vector.unwrap().anchored();
     let frame_first = FrameFirst::new(&model, GUSEV.focal_length_px()).unwrap();
     let fixed_point = FixedPoint::new(&model, GUSEV.focal_length_px()).unwrap();
     // 43.3 km of profile, as the paper's 142 footprints.

@@ -16,6 +16,8 @@ use serde::{Deserializer, Serializer, de, ser::Error as _};
 
 /// Number of values that one thread compresses as a piece.
 const PIECE: usize = 1 << 17;
+/// Level of compression: half the time of the default level, 8, for some percent more bytes.
+const LEVEL: usize = 4;
 /// Size of an encoded count or length, bytes.
 const LENGTH_BYTES: usize = 8;
 
@@ -70,7 +72,8 @@ impl Packed for bool {
 pub fn serialize<T: Packed, S: Serializer>(column: &[T], serializer: S) -> Result<S::Ok, S::Error> {
     let pieces = column.par_chunks(PIECE).map(|values| {
         let numbers: Vec<T::Number> = values.iter().map(|value| value.number()).collect();
-        simple_compress(&numbers, &ChunkConfig::default().with_enable_8_bit(true))
+        let config = ChunkConfig::default().with_compression_level(LEVEL);
+        simple_compress(&numbers, &config.with_enable_8_bit(true))
     });
     let pieces: Result<Vec<Vec<u8>>, _> = pieces.collect();
     let pieces = pieces.map_err(S::Error::custom)?;

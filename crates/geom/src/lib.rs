@@ -45,6 +45,7 @@ pub mod light_time;
 pub mod longitude_ring;
 pub mod map_projection;
 pub mod misregistration;
+pub mod nearby_angle;
 pub mod orbit_axes;
 pub mod oriented_camera;
 pub mod plane;

@@ -5,7 +5,8 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::{
-    body_rotation::body_rotation, ellipsoid::spherical_to_xyz_m, orbit_axes::radial_along_cross,
+    body_rotation::body_rotation, ellipsoid::spherical_to_xyz_m, nearby_angle::NearbyAngle,
+    orbit_axes::radial_along_cross,
 };
 use areograph_base::{
     body::Body,
@@ -52,10 +53,19 @@ impl RangeResiduals {
     /// The residuals of a shot in IAU 2000.
     #[must_use]
     pub fn of(shot: &Footprint, spacecraft: &SpacecraftState) -> Self {
-        let direction = spherical_to_xyz_m(shot.longitude_rad, shot.latitude_rad, 1.0);
-        let raw = Position::new(shot.radius_m * direction);
-        let crossover = Position::new(shot.radius_crossover_m * direction);
-        let own = own_spacecraft(shot);
+        let ground = spherical_to_xyz_m(shot.longitude_rad, shot.latitude_rad, 1.0);
+        Self::with(shot, spacecraft, &ground, own_spacecraft(shot))
+    }
+
+    /// With the direction of the footprint and the position of the spacecraft in the file.
+    fn with(
+        shot: &Footprint,
+        spacecraft: &SpacecraftState,
+        ground: &Vector3<f64>,
+        own: Position<BodyFixed>,
+    ) -> Self {
+        let raw = Position::new(shot.radius_m * ground);
+        let crossover = Position::new(shot.radius_crossover_m * ground);
         let craft = &spacecraft.position;
         let difference_m = own.xyz_m - craft.xyz_m;
         Self {
@@ -65,6 +75,49 @@ impl RangeResiduals {
             spacecraft_m: spacecraft.axes.tr_mul(&difference_m),
         }
     }
+}
+
+/// Longitude and latitude of a footprint and of its spacecraft, for shots close to it.
+#[derive(Debug, Clone, Copy)]
+pub struct NearbyShot {
+    ground: [NearbyAngle; 2],
+    spacecraft: [NearbyAngle; 2],
+}
+
+impl NearbyShot {
+    /// Shots close to this one.
+    #[must_use]
+    pub fn new(shot: &Footprint) -> Self {
+        let ground = [shot.longitude_rad, shot.latitude_rad];
+        let spacecraft = [shot.spacecraft_longitude_rad, shot.spacecraft_latitude_rad];
+        Self {
+            ground: ground.map(NearbyAngle::new),
+            spacecraft: spacecraft.map(NearbyAngle::new),
+        }
+    }
+
+    /// [`RangeResiduals::of`] within rounding.
+    #[must_use]
+    pub fn residuals(&self, shot: &Footprint, spacecraft: &SpacecraftState) -> RangeResiduals {
+        let ground = direction(&self.ground, shot.longitude_rad, shot.latitude_rad);
+        let own = direction(
+            &self.spacecraft,
+            shot.spacecraft_longitude_rad,
+            shot.spacecraft_latitude_rad,
+        );
+        let own = Position::new(shot.spacecraft_radius_m * own);
+        RangeResiduals::with(shot, spacecraft, &ground, own)
+    }
+}
+
+fn direction(near: &[NearbyAngle; 2], longitude_rad: f64, latitude_rad: f64) -> Vector3<f64> {
+    let (sin_longitude, cos_longitude) = near[0].sin_cos(longitude_rad);
+    let (sin_latitude, cos_latitude) = near[1].sin_cos(latitude_rad);
+    Vector3::new(
+        cos_latitude * cos_longitude,
+        cos_latitude * sin_longitude,
+        sin_latitude,
+    )
 }
 
 impl RangeResiduals {

@@ -112,20 +112,20 @@ pub fn write_json(path: &Path, document: &impl Serialize) -> Result<()> {
 /// values are omitted.
 pub(super) fn to_value(document: &impl Serialize) -> std::result::Result<Value, ProductError> {
     let value = serde_json::to_value(document).map_err(ProductError::refused("encode JSON"))?;
-    find_null(&value, "").map_or(Ok(value), |what| Err(ProductError::NotFinite { what }))
+    find_null(&value).map_or(Ok(value), |what| Err(ProductError::NotFinite { what }))
 }
 
 /// JSON pointer to the first null.
-fn find_null(value: &Value, path: &str) -> Option<String> {
+fn find_null(value: &Value) -> Option<String> {
     match value {
-        Value::Null => Some(path.to_owned()),
+        Value::Null => Some(String::new()),
         Value::Array(items) => items
             .iter()
             .enumerate()
-            .find_map(|(index, item)| find_null(item, &format!("{path}/{index}"))),
+            .find_map(|(index, item)| Some(format!("/{index}{}", find_null(item)?))),
         Value::Object(members) => members
             .iter()
-            .find_map(|(key, member)| find_null(member, &format!("{path}/{key}"))),
+            .find_map(|(key, member)| Some(format!("/{key}{}", find_null(member)?))),
         _ => None,
     }
 }

@@ -123,36 +123,55 @@ pub fn write_products<'a>(
 ) -> Result<Vec<Product>> {
     site.check()?;
     let pages = pages.into();
+    let before = Context {
+        site,
+        pages,
+        directory,
+        declarations,
+        written: &[],
+    };
     let mut written: Vec<Written> = Vec::new();
     for group in declarations.chunk_by(|one, next| one.scope() == next.scope()) {
-        let images: Vec<Option<&ImageProducts>> = match group[0].scope() {
-            Scope::Site => vec![None],
-            Scope::Image => site.images.iter().map(Some).collect(),
-            Scope::AdjustedImage => {
-                let images = site.adjustment().map(|(_, adjustment)| adjustment.images);
-                images.unwrap_or_default().iter().map(Some).collect()
-            }
-        };
-        for image in images {
-            for together in group.chunk_by(|one, next| one.is_apart() && next.is_apart()) {
-                let context = Context {
-                    site,
-                    pages,
-                    directory,
-                    declarations,
-                    written: &written,
-                };
-                let files: Vec<Result<Vec<Written>>> = together
-                    .par_iter()
-                    .map(|declaration| write(declaration, &context, image))
-                    .collect();
-                for files in files {
-                    written.extend(files?);
+        let parts = || group.chunk_by(|one, next| one.is_apart() && next.is_apart());
+        let images = match group[0].scope() {
+            Scope::Site => {
+                for part in parts() {
+                    let files = write_part(part, &before.after(&written), None)?;
+                    written.extend(files);
                 }
+                continue;
             }
+            Scope::Image => &site.images[..],
+            Scope::AdjustedImage => site
+                .adjustment()
+                .map_or(&[][..], |(_, adjustment)| adjustment.images),
+        };
+        // Files of an image do not depend on those of other images.
+        let context = before.after(&written);
+        let of_image = |image| {
+            let files = parts().map(|part| write_part(part, &context, Some(image)));
+            files.collect::<Result<Vec<_>>>()
+        };
+        let files: Vec<Result<Vec<Vec<Written>>>> = images.par_iter().map(of_image).collect();
+        for files in files {
+            written.extend(files?.into_iter().flatten());
         }
     }
     Ok(written.into_iter().map(|(product, _)| product).collect())
+}
+
+/// Writes products that do not depend on each other.
+fn write_part(
+    part: &[&'static Declaration],
+    of: &Context,
+    image: Option<&ImageProducts>,
+) -> Result<Vec<Written>> {
+    let files: Vec<Result<Vec<Written>>> = part
+        .par_iter()
+        .map(|declaration| write(declaration, of, image))
+        .collect();
+    let files: Vec<Vec<Written>> = files.into_iter().collect::<Result<_>>()?;
+    Ok(files.into_iter().flatten().collect())
 }
 
 /// Products of footprints in `formats`.

@@ -235,6 +235,16 @@ pub struct Context<'a> {
     pub(super) written: &'a [Written],
 }
 
+impl Context<'_> {
+    /// The same after these products.
+    pub(super) const fn after<'c>(&self, written: &'c [Written]) -> Context<'c>
+    where
+        Self: 'c,
+    {
+        Context { written, ..*self }
+    }
+}
+
 /// A program, or kind of program, with a section in `exchange/README.txt`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Program {

@@ -31,6 +31,8 @@ const SHORT_MESSAGE_SIZE: usize = 26;
 const LONG_MESSAGE_SIZE: usize = 1_841;
 /// Room for any time or clock string that CSPICE writes.
 const TIME_TEXT_SIZE: usize = 64;
+/// Room for a text of the kernel pool, whose values have up to 80 characters.
+const POOL_TEXT_SIZE: usize = 81;
 /// Doubles in front of a cell's data (`SPICE_CELL_CTRLSZ`).
 const CELL_CONTROL_SIZE: usize = naif::SPICE_CELL_CTRLSZ as usize;
 /// Sizes of the coverage window that are tried one after the other, in end points.
@@ -205,22 +207,39 @@ impl Cspice {
         self.check("spkgeo_c").map(|()| state)
     }
 
-    /// `spkez_c` with `LT+S`: apparent state of `target` seen from `observer` in J2000.
-    pub(super) fn apparent_state(&self, target: i32, et: f64, observer: i32) -> Called<StateKm> {
-        let (mut state, mut light_time_s) = ([0.0; 6], 0.0);
+    /// `spkssb_c`: geometric state of `target` relative to the barycentre of the solar system in J2000.
+    pub(super) fn barycentric_state(&self, target: i32, et: f64) -> Called<StateKm> {
+        let mut state = [0.0; 6];
         // SAFETY: the lock is held; `state` holds the six doubles that are written.
+        unsafe { naif::spkssb_c(target, et, c"J2000".as_ptr().cast_mut(), state.as_mut_ptr()) };
+        self.check("spkssb_c").map(|()| state)
+    }
+
+    /// `spkaps_c` with `LT+S`: apparent state of `target` in J2000, seen from an observer with this barycentric state and
+    /// acceleration, km/s².
+    pub(super) fn apparent_state(
+        &self,
+        target: i32,
+        et: f64,
+        mut observer: StateKm,
+        mut acceleration: [f64; 3],
+    ) -> Called<StateKm> {
+        let (mut state, mut light_time_s, mut light_time_rate) = ([0.0; 6], 0.0, 0.0);
+        // SAFETY: the lock is held; the arrays have the sizes that are read and written.
         unsafe {
-            naif::spkez_c(
+            naif::spkaps_c(
                 target,
                 et,
                 c"J2000".as_ptr().cast_mut(),
                 c"LT+S".as_ptr().cast_mut(),
-                observer,
+                observer.as_mut_ptr(),
+                acceleration.as_mut_ptr(),
                 state.as_mut_ptr(),
                 &raw mut light_time_s,
+                &raw mut light_time_rate,
             );
         }
-        self.check("spkez_c").map(|()| state)
+        self.check("spkaps_c").map(|()| state)
     }
 
     /// `pxform_c`: matrix from one frame to another.
@@ -236,6 +255,45 @@ impl Cspice {
             );
         }
         self.check("pxform_c").map(|()| matrix)
+    }
+
+    /// `namfrm_c` and `frinfo_c`: the code and the class of a frame; `None` for an unknown one.
+    pub(super) fn frame(&self, name: &CStr) -> Called<Option<(i32, i32)>> {
+        let (mut code, mut centre, mut class, mut class_id, mut found) = (0, 0, 0, 0, 0);
+        // SAFETY: the lock is held; `name` is zero-ended, the others are live integers.
+        unsafe {
+            naif::namfrm_c(name.as_ptr().cast_mut(), &raw mut code);
+            naif::frinfo_c(
+                code,
+                &raw mut centre,
+                &raw mut class,
+                &raw mut class_id,
+                &raw mut found,
+            );
+        }
+        self.check("frinfo_c")
+            .map(|()| (found != 0).then_some((code, class)))
+    }
+
+    /// `gcpool_c`: the first text of a variable of the text kernels; `None` for an unknown one.
+    pub(super) fn first_text(&self, variable: &CStr) -> Called<Option<CString>> {
+        let mut text = [0_u8; POOL_TEXT_SIZE];
+        let (mut count, mut found) = (0, 0);
+        // SAFETY: the lock is held; `variable` is zero-ended, `text` has room for one value of the announced size.
+        unsafe {
+            naif::gcpool_c(
+                variable.as_ptr().cast_mut(),
+                0,
+                1,
+                length(POOL_TEXT_SIZE),
+                &raw mut count,
+                text.as_mut_ptr().cast(),
+                &raw mut found,
+            );
+        }
+        self.check("gcpool_c")?;
+        let known = (found != 0).then(|| CString::new(text_of(&text)).unwrap_or_default());
+        Ok(known)
     }
 
     /// `ckgpav_c` in J2000: attitude and rates, `None` without a sample within the tolerance.

@@ -30,6 +30,7 @@
 //!
 //! `examples/state.rs` shows the state of the spacecraft at an instant.
 
+mod apparent;
 mod coverage;
 mod daf;
 mod error;
@@ -38,6 +39,7 @@ mod gaps;
 mod kernels;
 mod leap_seconds;
 mod metakernel;
+mod mounting;
 mod needs;
 mod origin;
 mod role;

@@ -12,11 +12,13 @@ use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::{
+    apparent::MarsAcceleration,
     coverage::Coverage,
     error::SpiceError,
     ffi::{Cspice, Rows, StateKm},
     kernels::KernelSet,
-    needs::{LEAP_SECONDS, Need, bus_frame, camera_frame, clocks, explain},
+    mounting::FixedMountings,
+    needs::{LEAP_SECONDS, Need, clocks, explain},
     origin::{self, Origin, all_finite},
     role::KernelRole,
 };
@@ -24,12 +26,10 @@ use areograph_base::{
     body::Body,
     constants::{NAIF_MARS, NAIF_SOLAR_SYSTEM_BARYCENTRE, NAIF_SUN, SPACECRAFT, Spacecraft},
     error::{Error, Locate, Result},
-    frames::{CameraFrame, J2000, Position, Rotation, SpacecraftBus},
-    instruments::Instrument,
+    frames::{J2000, Position, Rotation, SpacecraftBus},
     time::{CkLookup, Et},
     units::METRES_PER_KM,
 };
-use areograph_geom::body_rotation::frame_rotation_3;
 
 /// Digits of a second in UTC strings for people.
 const UTC_DECIMALS: u8 = 3;
@@ -96,6 +96,8 @@ struct Loaded {
     kernels: KernelSet,
     /// In the order of [`Spacecraft::all`].
     coverages: Vec<OnceCell<Coverage>>,
+    mountings: FixedMountings,
+    mars_acceleration: MarsAcceleration,
 }
 
 impl Session {
@@ -112,6 +114,8 @@ impl Session {
             cspice,
             kernels: kernels.clone(),
             coverages: vec![OnceCell::new(); Spacecraft::all().len()],
+            mountings: FixedMountings::default(),
+            mars_acceleration: MarsAcceleration::default(),
         };
         Ok(Self {
             loaded: Rc::new(loaded),
@@ -136,6 +140,14 @@ impl Session {
 
     pub(super) fn cspice(&self) -> &Cspice {
         &self.loaded.cspice
+    }
+
+    pub(super) fn mountings(&self) -> &FixedMountings {
+        &self.loaded.mountings
+    }
+
+    pub(super) fn mars_acceleration(&self) -> &MarsAcceleration {
+        &self.loaded.mars_acceleration
     }
 
     /// The version of CSPICE, for example `CSPICE_N0067`.
@@ -172,7 +184,7 @@ impl Session {
     }
 
     /// An error of CSPICE, or the missing kernel that explains it.
-    fn explain(&self, error: SpiceError, needs: &[Need]) -> SpiceError {
+    pub(super) fn explain(&self, error: SpiceError, needs: &[Need]) -> SpiceError {
         explain(self.kernels(), error, needs)
     }
 
@@ -244,9 +256,7 @@ impl Session {
     /// # Errors
     /// As [`Self::state`].
     pub fn apparent_state(&self, et: Et) -> Result<State> {
-        let state = self
-            .cspice()
-            .apparent_state(self.spacecraft.naif, et.seconds(), NAIF_MARS)?;
+        let state = self.orbiter_seen_from_mars(self.spacecraft.naif, et.seconds())?;
         self.finite(
             "apparent position or velocity",
             &self.spacecraft.name,
@@ -272,8 +282,7 @@ impl Session {
     /// [`SpiceError::NoSun`] when the kernels do not hold the Sun when its light left; as [`Self::state`].
     pub fn sun_state(&self, et: Et) -> Result<State> {
         let state = self
-            .cspice()
-            .apparent_state(NAIF_SUN, et.seconds(), NAIF_MARS)
+            .seen_from_mars(NAIF_SUN, et.seconds())
             .map_err(|error| {
                 if error.is_coverage() {
                     let utc = self.et_to_utc(et).unwrap_or_else(|_| "unknown".to_owned());
@@ -324,7 +333,13 @@ impl Session {
     pub fn attitude(&self, lookup: CkLookup, exposure: Et, tolerance_s: f64) -> Result<Attitude> {
         let kernel_time = lookup.kernel_time();
         let ticks = self.et_to_ticks(kernel_time)?;
-        let ticks_per_s = self.et_to_ticks(kernel_time.plus(1.0))? - ticks;
+        // Without a tolerance, the attitude belongs to the requested instant, and no distance has to be converted.
+        let is_exact = tolerance_s.abs() <= 0.0;
+        let ticks_per_s = if is_exact {
+            1.0
+        } else {
+            self.et_to_ticks(kernel_time.plus(1.0))? - ticks
+        };
         let pointing = self
             .cspice()
             .pointing(self.spacecraft.bus, ticks, tolerance_s * ticks_per_s)?
@@ -361,31 +376,6 @@ impl Session {
         Ok(ticks.map_err(|error| self.explain(error, &clocks(self.spacecraft)))?)
     }
 
-    /// Mounting of `instrument` by the loaded kernels, converted to its camera axes.
-    ///
-    /// # Errors
-    /// [`SpiceError::MissingText`] when no loaded kernel defines the two frames.
-    pub fn mounting(
-        &self,
-        instrument: &Instrument,
-        et: Et,
-    ) -> Result<Rotation<SpacecraftBus, CameraFrame>> {
-        let [bus, camera] = [&instrument.naif.bus_frame, &instrument.naif.frame]
-            // A name with a zero byte is truncated there, and then no kernel defines it.
-            .map(|name| CString::new(name.split('\0').next().unwrap_or_default()));
-        let needs = [camera_frame(instrument), bus_frame(instrument.spacecraft)];
-        let rows = self
-            .cspice()
-            .frame_matrix(
-                &bus.unwrap_or_default(),
-                &camera.unwrap_or_default(),
-                et.seconds(),
-            )
-            .map_err(|error| self.explain(error, &needs))?;
-        let turn = frame_rotation_3(instrument.naif.turn_rad);
-        Ok(Rotation::new(turn * matrix(&rows), et))
-    }
-
     /// Matrix from J2000 to the frame of `body` in the loaded planetary constants, to identify the IAU report they
     /// follow.
     ///
@@ -399,6 +389,6 @@ impl Session {
     }
 }
 
-fn matrix(rows: &Rows) -> Matrix3<f64> {
+pub(super) fn matrix(rows: &Rows) -> Matrix3<f64> {
     Matrix3::from_fn(|row, column| rows[row][column])
 }

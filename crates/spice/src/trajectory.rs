@@ -51,6 +51,13 @@ impl Trajectory {
         Some((Position::new(piece.value(et)), piece.derivative(et)))
     }
 
+    /// Whether one polynomial gives all positions of this time: segments of the kernels do not end in it.
+    #[must_use]
+    pub fn is_smooth_over(&self, interval: Interval) -> bool {
+        let piece = self.piece(interval.start);
+        piece.is_some_and(|piece| piece.interval().contains(interval.stop))
+    }
+
     fn piece(&self, et: Et) -> Option<&ChebyshevVector> {
         let index = self
             .pieces

@@ -93,7 +93,7 @@ stage_inputs! {
 
 impl Stage for Reorient<'_> {
     const NAME: &'static str = "reorient";
-    const METHOD: u32 = 4;
+    const METHOD: u32 = 5;
     type Output = Orientation;
     stage_inputs!(fingerprint);
 

@@ -51,7 +51,7 @@ stage_inputs! {
 
 impl Stage for SampleOrientation<'_> {
     const NAME: &'static str = "sample_orientation";
-    const METHOD: u32 = 7;
+    const METHOD: u32 = 8;
     type Output = Orientation;
     stage_inputs!(fingerprint);
 
@@ -160,9 +160,8 @@ pub fn sample_orientation(
     for sample in &mut samples {
         sample.to_spacecraft_m = reader.geometric(sample.et)?.xyz_m - sample.position.xyz_m;
     }
-    let tables = camera_tables::camera_tables(&reader, image, kernels.padding_s)?;
-    let nodes: Vec<Et> = tables.et_s.iter().copied().map(Et::from_seconds).collect();
-    let held = held_attitudes(&reader, epochs.iter().chain(&nodes))?;
+    let (tables, of_nodes_s) = camera_tables::camera_tables(&reader, image, kernels.padding_s)?;
+    let held = held_attitudes(&reader, &epochs, of_nodes_s)?;
     let far = held.as_ref().filter(|held| held.is_unexplained());
     Ok(Orientation {
         image: image.id.clone(),
@@ -267,14 +266,16 @@ impl fmt::Display for HeldAttitudes {
     }
 }
 
-/// Attitudes at `exposures` that lie outside the C-kernels' intervals, if there are any.
-fn held_attitudes<'e>(
+/// Attitudes at `exposures`, and at nodes with these distances, that lie outside the C-kernels' intervals, if there are
+/// any.
+fn held_attitudes(
     reader: &CameraReader<'_>,
-    exposures: impl Iterator<Item = &'e Et>,
+    exposures: &[Et],
+    mut distances_s: Vec<f64>,
 ) -> Result<Option<HeldAttitudes>> {
-    let distances_s = exposures
-        .map(|exposure| Ok(reader.attitude(*exposure)?.distance_s))
-        .collect::<Result<Vec<f64>>>()?;
+    for exposure in exposures {
+        distances_s.push(reader.attitude(*exposure)?.distance_s);
+    }
     let lookups = distances_s.iter().filter(|s| !(**s <= 0.0)).count();
     Ok((lookups > 0).then(|| HeldAttitudes {
         lookups,

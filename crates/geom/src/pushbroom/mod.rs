@@ -37,7 +37,9 @@ use nalgebra::{Matrix3, Vector3};
 pub use corrected::{CorrectedOrientation, OrientationCorrection};
 pub use detector::{Detector, RadialFit};
 pub use distortion::{Distortion, FoldedLine};
-pub use models::{CameraModel, EulerPolynomial, RotationVectorPolynomial, VectorPolynomial};
+pub use models::{
+    Anchor, CameraModel, EulerPolynomial, RotationVectorPolynomial, VectorPolynomial,
+};
 pub(super) use newton::missed_m;
 pub use newton::{Projector, Sighting};
 pub use published::{FixedPoint, FrameFirst, Limits, Solution};
@@ -68,6 +70,16 @@ pub trait ExteriorOrientation: Sync {
 
     /// The pose with its change per line.
     fn pose_and_rate(&self, x: f64) -> (Pose, PoseRate);
+
+    /// What [`Self::pose_and_rate_near`] needs of a line.
+    fn anchor(&self, _x: f64) -> Anchor {
+        Anchor::default()
+    }
+
+    /// [`Self::pose_and_rate`] within rounding, faster at lines near that of `anchor`.
+    fn pose_and_rate_near(&self, x: f64, _anchor: &Anchor) -> (Pose, PoseRate) {
+        self.pose_and_rate(x)
+    }
 }
 
 impl<M: ExteriorOrientation + ?Sized> ExteriorOrientation for &M {
@@ -77,6 +89,14 @@ impl<M: ExteriorOrientation + ?Sized> ExteriorOrientation for &M {
 
     fn pose_and_rate(&self, x: f64) -> (Pose, PoseRate) {
         (**self).pose_and_rate(x)
+    }
+
+    fn anchor(&self, x: f64) -> Anchor {
+        (**self).anchor(x)
+    }
+
+    fn pose_and_rate_near(&self, x: f64, anchor: &Anchor) -> (Pose, PoseRate) {
+        (**self).pose_and_rate_near(x, anchor)
     }
 }
 

@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{ExteriorOrientation, PolynomialPath, Pose, PoseRate};
 use crate::{
-    attitude::{left_jacobian_product, matrix_of_rotation_vector},
+    attitude::{left_jacobian_product, matrix_of_rotation_vector, matrix_of_small_vector},
+    nearby_angle::NearbyAngle,
     polynomial::Polynomial,
 };
 
@@ -97,6 +98,10 @@ impl VectorPolynomial {
     }
 }
 
+/// Angles of a line, from which the sines and cosines of those of lines near it follow.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Anchor([NearbyAngle; 3]);
+
 /// `M` of ω, φ, κ, and `Ω` of their rates.
 struct EulerRotation {
     sin: Vector3<f64>,
@@ -110,6 +115,20 @@ impl EulerRotation {
             (sin[index], cos[index]) = angles_rad[index].sin_cos();
         }
         Self { sin, cos }
+    }
+
+    /// The same within rounding, by the angles of a line nearby.
+    fn near(angles_rad: &Vector3<f64>, anchor: &Anchor) -> Self {
+        let [omega, phi, kappa] = &anchor.0;
+        let (omega, phi, kappa) = (
+            omega.sin_cos(angles_rad.x),
+            phi.sin_cos(angles_rad.y),
+            kappa.sin_cos(angles_rad.z),
+        );
+        Self {
+            sin: Vector3::new(omega.0, phi.0, kappa.0),
+            cos: Vector3::new(omega.1, phi.1, kappa.1),
+        }
     }
 
     fn mars_to_camera(&self) -> Matrix3<f64> {
@@ -150,7 +169,22 @@ impl ExteriorOrientation for EulerPolynomial {
     }
 
     fn pose_and_rate(&self, x: f64) -> (Pose, PoseRate) {
-        let rotation = EulerRotation::of(&self.angles_rad.value(x));
+        self.turned(x, &EulerRotation::of(&self.angles_rad.value(x)))
+    }
+
+    fn anchor(&self, x: f64) -> Anchor {
+        let angles_rad: [f64; 3] = self.angles_rad.value(x).into();
+        Anchor(angles_rad.map(NearbyAngle::new))
+    }
+
+    fn pose_and_rate_near(&self, x: f64, anchor: &Anchor) -> (Pose, PoseRate) {
+        self.turned(x, &EulerRotation::near(&self.angles_rad.value(x), anchor))
+    }
+}
+
+impl EulerPolynomial {
+    /// The pose with its change per line, with the rotation of the line.
+    fn turned(&self, x: f64, rotation: &EulerRotation) -> (Pose, PoseRate) {
         let pose = Pose {
             position_m: self.path_m.value(x),
             mars_to_camera: rotation.mars_to_camera(),
@@ -184,10 +218,68 @@ impl ExteriorOrientation for RotationVectorPolynomial {
         };
         (self.pose(x), motion)
     }
+
+    fn pose_and_rate_near(&self, x: f64, _anchor: &Anchor) -> (Pose, PoseRate) {
+        let vector_rad = self.vector_rad.value(x);
+        let pose = Pose {
+            position_m: self.path_m.value(x),
+            mars_to_camera: matrix_of_small_vector(&vector_rad) * self.reference,
+        };
+        let motion = PoseRate {
+            advance_m: self.path_m.rate(x),
+            turn_rad: left_jacobian_product(&vector_rad, &self.vector_rad.rate(x)),
+        };
+        (pose, motion)
+    }
 }
 
 impl PolynomialPath for RotationVectorPolynomial {
     fn path_m(&self) -> &VectorPolynomial {
         &self.path_m
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn poses_near_a_line_are_those_of_the_line_within_rounding() {
+        let polynomial = |constant, linear, square| VectorPolynomial {
+            coefficients: [constant, linear, square],
+        };
+        let path_m = polynomial(
+            Vector3::new(3.7e6, 1e5, -4e5),
+            Vector3::new(0.1, 0.5, 3.0),
+            Vector3::new(-1e-6, 1e-7, 1e-6),
+        );
+        let turn = Vector3::new(4e-7, -6e-7, 2e-7);
+        let euler = EulerPolynomial {
+            path_m,
+            angles_rad: polynomial(Vector3::new(2.9, -1.1, -2.0), turn, 1e-4 * turn),
+        };
+        let vector = RotationVectorPolynomial {
+            path_m,
+            vector_rad: polynomial(1e-3 * turn, turn, 1e-4 * turn),
+            reference: euler.pose(0.0).mars_to_camera,
+        };
+        let models: [&dyn ExteriorOrientation; 2] = [&euler, &vector];
+        for model in models {
+            // Within the image, at the limit of the series, and beyond.
+            for (anchor, x) in [
+                (0.0, 0.0),
+                (0.0, 80.0),
+                (-4_000.0, -4_080.0),
+                (0.0, 9_000.0),
+                (0.0, 4e5),
+            ] {
+                let (pose, motion) = model.pose_and_rate(x);
+                let (near, motion_near) = model.pose_and_rate_near(x, &model.anchor(anchor));
+                assert_eq!(pose.position_m, near.position_m);
+                // Rounding of products of sines and cosines.
+                assert!((pose.mars_to_camera - near.mars_to_camera).amax() < 1e-15);
+                assert!((motion.turn_rad - motion_near.turn_rad).amax() < 1e-20);
+            }
+        }
     }
 }

@@ -3,7 +3,9 @@
 
 use nalgebra::Vector3;
 
-use super::{Distortion, ExteriorOrientation, Pose, Solution, Unseen, flight_sense};
+use super::{
+    Anchor, Distortion, ExteriorOrientation, Pose, PoseRate, Solution, Unseen, flight_sense,
+};
 
 /// Lines of the table that start the iteration, equally spaced over the image.
 const NODES: u32 = 65;
@@ -33,12 +35,24 @@ impl Sighting {
     pub fn near(
         model: &(impl ExteriorOrientation + ?Sized),
         distortion: &Distortion,
+        x: f64,
+        point_m: &Vector3<f64>,
+        last_step_lines: f64,
+    ) -> Result<Self, Unseen> {
+        let pose_and_rate = |x| model.pose_and_rate(x);
+        Self::with(pose_and_rate, distortion, x, point_m, last_step_lines)
+    }
+
+    /// As [`Self::near`], with the pose and its change per line that `pose_and_rate` gives for a line.
+    fn with(
+        pose_and_rate: impl Fn(f64) -> (Pose, PoseRate),
+        distortion: &Distortion,
         mut x: f64,
         point_m: &Vector3<f64>,
         last_step_lines: f64,
     ) -> Result<Self, Unseen> {
         for evaluations in 1..=EVALUATIONS_MAX {
-            let (pose, motion) = model.pose_and_rate(x);
+            let (pose, motion) = pose_and_rate(x);
             let camera_m = pose.camera_vector_m(point_m);
             let rate_m = motion.camera_vector_rate_m(&pose, &camera_m);
             let [missed_m, missed_rate_m] = missed_m(distortion, &camera_m, &rate_m);
@@ -93,6 +107,8 @@ pub(crate) fn missed_m(
 pub struct Projector<'a, M: ?Sized> {
     model: &'a M,
     distortion: Distortion,
+    /// Whether poses follow from those of the nodes.
+    is_anchored: bool,
     half_lines: f64,
     nodes_per_line: f64,
     nodes: Vec<Node>,
@@ -106,6 +122,7 @@ struct Node {
     axis: Vector3<f64>,
     axis_rate: Vector3<f64>,
     advance_m: f64,
+    anchor: Anchor,
 }
 
 impl Node {
@@ -121,6 +138,7 @@ impl Node {
             // The first row of [Ω]× M.
             axis_rate: m.row(2).transpose() * turn.y - m.row(1).transpose() * turn.z,
             advance_m: axis.dot(&motion.advance_m),
+            anchor: model.anchor(x),
         }
     }
 
@@ -148,6 +166,7 @@ impl<'a, M: ExteriorOrientation + ?Sized> Projector<'a, M> {
         Ok(Self {
             model,
             distortion: Distortion::NONE,
+            is_anchored: false,
             half_lines,
             nodes_per_line: spacing.recip(),
             nodes,
@@ -158,6 +177,15 @@ impl<'a, M: ExteriorOrientation + ?Sized> Projector<'a, M> {
     #[must_use]
     pub fn through(self, distortion: Distortion) -> Self {
         Self { distortion, ..self }
+    }
+
+    /// For many points: poses follow from those of the nodes by short series. Lines are the same within 1e-10.
+    #[must_use]
+    pub fn anchored(self) -> Self {
+        Self {
+            is_anchored: true,
+            ..self
+        }
     }
 
     /// The orientation.
@@ -182,7 +210,14 @@ impl<'a, M: ExteriorOrientation + ?Sized> Projector<'a, M> {
     /// [`Unseen::BehindCamera`], [`Unseen::NotConverged`], [`Unseen::NotFinite`].
     pub fn project(&self, point_m: &Vector3<f64>) -> Result<Solution, Unseen> {
         let start = self.nearest(0.0).newton(point_m);
-        let x = self.nearest(start).newton(point_m);
-        Ok(Sighting::near(self.model, &self.distortion, x, point_m, LAST_STEP_LINES)?.solution)
+        let node = self.nearest(start);
+        let (distortion, x) = (&self.distortion, node.newton(point_m));
+        let sighting = if self.is_anchored {
+            let pose_and_rate = |x| self.model.pose_and_rate_near(x, &node.anchor);
+            Sighting::with(pose_and_rate, distortion, x, point_m, LAST_STEP_LINES)
+        } else {
+            Sighting::near(self.model, distortion, x, point_m, LAST_STEP_LINES)
+        };
+        Ok(sighting?.solution)
     }
 }

@@ -206,6 +206,46 @@ fn apparent_positions_and_the_sun_are_those_of_the_support_data() {
 }
 
 #[test]
+fn a_mounting_is_read_once_only_where_it_is_constant() {
+    let (Some(folder), Some((_, truth))) = (
+        real_data("ale_mgs/m0402852", "mountings"),
+        image("mountings"),
+    ) else {
+        return;
+    };
+    let samples = rows(&truth["eo_m0402852"]["samples"]);
+    let [first, last] = [&samples[0], &samples[30]].map(|s| Et::from_seconds(number(&s["et"])));
+    let mounted_on = |relative: &str| {
+        let written = tempfile::tempdir().unwrap();
+        let file = written.path().join("camera.tf");
+        // Through a frame that is constant relative to the other one.
+        let text = format!(
+            "KPL/FK\n\\begindata\nFRAME_HOLDER = 1494031\nFRAME_1494031_NAME = 'HOLDER'\n\
+             FRAME_1494031_CLASS = 4\nFRAME_1494031_CLASS_ID = 1494031\nFRAME_1494031_CENTER = -94\n\
+             TKFRAME_1494031_RELATIVE = '{relative}'\nTKFRAME_1494031_SPEC = 'ANGLES'\n\
+             TKFRAME_1494031_UNITS = 'DEGREES'\nTKFRAME_1494031_AXES = ( 1 2 3 )\n\
+             TKFRAME_1494031_ANGLES = ( 10 20 30 )\nTKFRAME_-94031_RELATIVE = 'HOLDER'\n\\begintext\n"
+        );
+        #[allow(clippy::disallowed_methods, reason = "input of a test, not a product")]
+        std::fs::write(&file, text).unwrap();
+        let mut files = m0402852_files(&folder);
+        files.push(file);
+        let session = Session::open(&KernelSet::from_files(&files).unwrap()).unwrap();
+        let mounting = |et| session.mounting(usual_instrument(), et).unwrap();
+        // Asked for again, an instant has the mounting of that instant.
+        let asked = [first, last, first].map(mounting);
+        assert_eq!(asked.map(|of| of.at()), [first, last, first]);
+        asked.map(|of| *of.matrix())
+    };
+    let [before, after, again] = mounted_on("MGS_SPACECRAFT");
+    assert!(before == after && before == again);
+    let [before, after, again] = mounted_on("J2000");
+    assert_eq!(before, again);
+    // The bus turns by 0.05° a second.
+    assert!(worst(&before, &after) > 1e-4);
+}
+
+#[test]
 fn closed_rotations_equal_the_kernels() {
     let cases: [(&str, Body, &BodyModel); 8] = [
         (

@@ -55,7 +55,7 @@ use rows::{Rows, Task};
 /// Name of the step in messages, and of its outputs.
 pub const NAME: &str = "check_archive";
 /// Raised when the results of the step change.
-pub const METHOD: u32 = 7;
+pub const METHOD: u32 = 8;
 /// Stages whose functions it calls.
 pub const CALLS: &[Called] = &[called::<ConvertDatum<'_>>(), called::<CheckRanges<'_>>()];
 

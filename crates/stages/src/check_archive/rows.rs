@@ -4,11 +4,11 @@ use std::{collections::BTreeMap, ops::Range};
 
 use super::{
     ArchiveRules,
-    spacecraft::{FrameSpacecraft, state},
+    spacecraft::{FrameSpacecraft, StateGrid, state},
 };
 use crate::convert_datum::DatumTurn;
 use areograph_base::{footprints::Footprint, time::Et};
-use areograph_geom::range_residuals::RangeResiduals;
+use areograph_geom::range_residuals::{NearbyShot, RangeResiduals};
 use areograph_pds::{
     archive::ShotRejection,
     pedr::{Complaint, FieldGuard, Frame, SHOTS, SpoiledShots, Stretch},
@@ -69,21 +69,23 @@ impl Rows<'_> {
             shots: Vec::with_capacity(SHOTS * rows.len()),
             ..Task::default()
         };
+        let mut grid = StateGrid::new(self.trajectory);
         for (row, frame) in self.stretch.frames(rows, self.guard) {
             match frame {
-                Ok(frame) => self.frame(row, &frame, &mut task),
+                Ok(frame) => self.frame(row, &frame, &mut grid, &mut task),
                 Err(error) => task.complaints.push(self.stretch.complaint(row, &error)),
             }
         }
         task
     }
 
-    fn frame(&self, row: usize, frame: &Frame<'_>, task: &mut Task) {
+    fn frame(&self, row: usize, frame: &Frame<'_>, grid: &mut StateGrid<'_>, task: &mut Task) {
         let record = self.stretch.record_number(row);
         let clock = self.rules.clock;
         let middle = clock.spacecraft_time(frame.record().time_s.get());
-        let spacecraft = FrameSpacecraft::around(middle, self.trajectory);
+        let spacecraft = FrameSpacecraft::around(middle, grid);
         let mut shots = [None; SHOTS];
+        let mut nearby = None;
         for (slot, number) in shots.iter_mut().zip(1..) {
             *slot = frame.shot(number).map(|shot| {
                 let shot = self.turn.applied(Footprint {
@@ -96,7 +98,9 @@ impl Rows<'_> {
                     Some(spacecraft) => Some(spacecraft.at(at.since(middle))),
                     None => state(at, self.trajectory),
                 };
-                let residuals = spacecraft.map(|craft| RangeResiduals::of(&shot, &craft));
+                // A frame is 6 km long: 2e-3 rad, except close to the poles.
+                let nearby = nearby.get_or_insert_with(|| NearbyShot::new(&shot));
+                let residuals = spacecraft.map(|craft| nearby.residuals(&shot, &craft));
                 (shot, residuals)
             });
         }

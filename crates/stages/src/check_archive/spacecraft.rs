@@ -1,8 +1,12 @@
-//! The spacecraft over a frame: four states, and the cubics through them.
+//! The spacecraft over a frame: four states, and the cubics through them. The states follow from those of a grid of whole
+//! steps, which frames share.
 
 use nalgebra::{Matrix3, Vector3};
 
-use areograph_base::{frames::Position, time::Et};
+use areograph_base::{
+    frames::Position,
+    time::{Et, Interval},
+};
 use areograph_geom::range_residuals::SpacecraftState;
 use areograph_spice::Trajectory;
 
@@ -16,8 +20,8 @@ pub(super) struct FrameSpacecraft {
 
 impl FrameSpacecraft {
     /// `None` where the trajectory does not cover the complete frame.
-    pub(super) fn around(middle: Et, trajectory: &Trajectory) -> Option<Self> {
-        let [a, b, c, d] = NODES_S.map(|late_s| state(middle.plus(late_s), trajectory));
+    pub(super) fn around(middle: Et, grid: &mut StateGrid<'_>) -> Option<Self> {
+        let [a, b, c, d] = NODES_S.map(|late_s| grid.state(middle.plus(late_s)));
         Some(Self {
             states: [a?, b?, c?, d?],
         })
@@ -29,15 +33,110 @@ impl FrameSpacecraft {
     /// 1e-6 m: of an orbit of 3,800 km in the rotating frame of Mars, whose fourth derivative is 3e-6 m/s⁴, a cubic
     /// through nodes 0.67 s apart leaves 3e-8 m.
     pub(super) fn at(&self, late_s: f64) -> SpacecraftState {
-        let (mut position_m, mut axes) = (Vector3::zeros(), Matrix3::zeros());
-        for (state, weight) in self.states.iter().zip(weights(late_s)) {
-            position_m += weight * state.position.xyz_m;
-            axes += weight * state.axes;
+        combined(&self.states, &weights(late_s))
+    }
+}
+
+/// Time between the states of the grid, seconds, and how many of them give a state between.
+const GRID_S: f64 = 4.0;
+const GRID_STATES: usize = 6;
+/// Steps from the first of them to the last one at or before an instant, and to the last.
+const GRID_BEFORE: i64 = 2;
+const GRID_LAST: i64 = 5;
+/// Largest number of a state: of times thirty million years away, which a spoiled record may state.
+const GRID_END: f64 = 2.5e14;
+
+/// States at whole multiples of [`GRID_S`], each computed once for times in order.
+pub(super) struct StateGrid<'a> {
+    trajectory: &'a Trajectory,
+    /// Number of the first of `states`.
+    first: i64,
+    states: [Option<SpacecraftState>; GRID_STATES],
+    /// Whether one polynomial gives all of them.
+    is_smooth: bool,
+}
+
+impl<'a> StateGrid<'a> {
+    pub(super) const fn new(trajectory: &'a Trajectory) -> Self {
+        Self {
+            trajectory,
+            first: i64::MIN,
+            states: [None; GRID_STATES],
+            is_smooth: false,
         }
-        SpacecraftState {
-            position: Position::new(position_m),
-            axes,
+    }
+
+    /// The state at one instant; by the trajectory itself close to the ends of its polynomials, where the orbit of the
+    /// kernels may have a step.
+    ///
+    /// # Accuracy
+    /// 1e-9 m: the sixth derivative of an orbit of 3,800 km in the rotating frame of Mars is 3e-12 m/s⁶.
+    fn state(&mut self, at: Et) -> Option<SpacecraftState> {
+        let place = at.seconds() / GRID_S;
+        // Written so that NaN does not count as within.
+        if !(place.abs() < GRID_END) {
+            return state(at, self.trajectory);
         }
+        #[allow(clippy::cast_possible_truncation, reason = "a number below GRID_END")]
+        let first = place.floor() as i64 - GRID_BEFORE;
+        self.move_to(first);
+        let late = place - first as f64;
+        match self.states {
+            [Some(a), Some(b), Some(c), Some(d), Some(e), Some(f)] if self.is_smooth => {
+                Some(combined(&[a, b, c, d, e, f], &grid_weights(late)))
+            }
+            _ => state(at, self.trajectory),
+        }
+    }
+
+    /// Keeps the states that remain in use, and computes the others.
+    fn move_to(&mut self, first: i64) {
+        if first == self.first {
+            return;
+        }
+        let known = (self.first, self.states);
+        self.first = first;
+        let at = |number: i64| Et::from_seconds(number as f64 * GRID_S);
+        self.is_smooth = self
+            .trajectory
+            .is_smooth_over(Interval::new(at(first), at(first + GRID_LAST)));
+        for (slot, number) in self.states.iter_mut().zip(first..) {
+            let of_known = number
+                .checked_sub(known.0)
+                .and_then(|place| usize::try_from(place).ok());
+            *slot = match of_known.and_then(|place| known.1.get(place)) {
+                Some(state) => *state,
+                None => state(at(number), self.trajectory),
+            };
+        }
+    }
+}
+
+/// Weights of the states of the grid in the polynomial through them, `late` steps after the first.
+fn grid_weights(late: f64) -> [f64; GRID_STATES] {
+    let from: [f64; GRID_STATES] = std::array::from_fn(|node| late - node as f64);
+    let [a, b, c, d, e, f] = from;
+    let (abc, def) = (a * b * c, d * e * f);
+    [
+        b * c * def / -120.0,
+        a * c * def / 24.0,
+        a * b * def / -12.0,
+        abc * e * f / 12.0,
+        abc * d * f / -24.0,
+        abc * d * e / 120.0,
+    ]
+}
+
+/// Sum of states with these weights, which add up to 1.
+fn combined<const N: usize>(states: &[SpacecraftState; N], weights: &[f64; N]) -> SpacecraftState {
+    let (mut position_m, mut axes) = (Vector3::zeros(), Matrix3::zeros());
+    for (state, weight) in states.iter().zip(weights) {
+        position_m += *weight * state.position.xyz_m;
+        axes += *weight * state.axes;
+    }
+    SpacecraftState {
+        position: Position::new(position_m),
+        axes,
     }
 }
 
@@ -72,6 +171,20 @@ mod tests {
                 .map(|(node_s, weight)| weight * cubic(*node_s))
                 .sum();
             assert!((through - cubic(late_s)).abs() < 1e-14); // rounding
+        }
+    }
+
+    #[test]
+    fn polynomials_of_the_fifth_degree_are_met_by_the_weights_of_the_grid() {
+        for degree in 0..6 {
+            for late in [0.0, 2.0, 2.3, 2.9, 3.0, 5.0] {
+                let through: f64 = grid_weights(late)
+                    .iter()
+                    .enumerate()
+                    .map(|(node, weight)| weight * (node as f64).powi(degree))
+                    .sum();
+                assert!((through - late.powi(degree)).abs() < 1e-11); // rounding of numbers up to 3,125
+            }
         }
     }
 }

@@ -148,7 +148,7 @@ impl Input for MeasuredTies<'_> {
 
 impl Stage for LayOverlays<'_> {
     const NAME: &'static str = "lay_overlays";
-    const METHOD: u32 = 2;
+    const METHOD: u32 = 3;
     type Output = Overlays;
     stage_inputs!(fingerprint);
 

@@ -14,18 +14,19 @@ const TABLE_NODES_MIN: u32 = 31;
 /// Nodes beyond each end of the image, so that an eighth-order interpolation never runs out.
 const TABLE_NODES_BEYOND: u32 = 8;
 
-/// Tables whose interpolation keeps [`InterpolationCheck::LIMIT_PX`], or the densest ones: a node per line.
+/// Tables whose interpolation keeps [`InterpolationCheck::LIMIT_PX`], or the densest ones: a node per line. With the
+/// distance of each node from the intervals of the C-kernels, seconds.
 pub(super) fn camera_tables(
     reader: &CameraReader<'_>,
     image: &ImageTimes,
     padding_s: f64,
-) -> Result<CameraTables> {
+) -> Result<(CameraTables, Vec<f64>)> {
     let mut steps = first_steps(image);
     loop {
-        let mut tables = tables(reader, &table_epochs(image, steps, padding_s))?;
+        let (mut tables, held_s) = tables(reader, &table_epochs(image, steps, padding_s))?;
         tables.interpolation = InterpolationCheck::of(image, &tables, |et| reader.camera(et))?;
         if tables.interpolation.keeps_limit() || steps >= image.line_times.lines() {
-            return Ok(tables);
+            return Ok((tables, held_s));
         }
         steps = (2 * steps).min(image.line_times.lines());
     }
@@ -62,8 +63,8 @@ fn table_epochs(image: &ImageTimes, steps: u32, padding_s: f64) -> Vec<Et> {
         .collect()
 }
 
-/// Tables at two or more epochs.
-fn tables(reader: &CameraReader<'_>, epochs: &[Et]) -> Result<CameraTables> {
+/// Tables at two or more epochs, and the distance of each from the intervals of the C-kernels, seconds.
+fn tables(reader: &CameraReader<'_>, epochs: &[Et]) -> Result<(CameraTables, Vec<f64>)> {
     let session = reader.session;
     let [first, last] = [epochs[0], epochs[epochs.len() - 1]];
     let suns = [session.sun_state(first)?, session.sun_state(last)?];
@@ -82,12 +83,14 @@ fn tables(reader: &CameraReader<'_>, epochs: &[Et]) -> Result<CameraTables> {
         bus_to_camera: session.mounting(reader.instrument, first)?,
         interpolation: InterpolationCheck::default(),
     };
+    let mut held_s = Vec::with_capacity(nodes);
     for epoch in epochs {
         let attitude = reader.attitude(*epoch)?;
         let looks = tables.bus_to_camera.matrix() * attitude.inertial_to_bus.matrix();
         let boresight = looks.row(2).transpose();
         let RayOrigin { state, to_mars } =
             RayOrigin::at(session, reader.light_time, *epoch, &boresight)?;
+        held_s.push(attitude.distance_s);
         tables.et_s.push(epoch.seconds());
         tables.position_m.push(state.position.xyz_m);
         tables.velocity_m_s.push(state.velocity_m_s);
@@ -100,5 +103,5 @@ fn tables(reader: &CameraReader<'_>, epochs: &[Et]) -> Result<CameraTables> {
             .mars_angular_velocity_rad_s
             .push(CameraTables::spin_rad_s(Body::Mars, to_mars.matrix()));
     }
-    Ok(tables)
+    Ok((tables, held_s))
 }

@@ -102,7 +102,7 @@ impl<'a> OrientedImage<'a> {
         required: CameraModel,
     ) -> std::result::Result<Projector<'_, dyn ExteriorOrientation>, Unseen> {
         let projector = Projector::new(self.orientation(required), self.lines())?;
-        Ok(projector.through(self.detector.distortion))
+        Ok(projector.through(self.detector.distortion).anchored())
     }
 
     /// Line and sample at which `projector` sees a point, in the image or outside it.

@@ -1,6 +1,7 @@
 //! The exterior orientation of an image, whether sampled from kernels or corrected.
 
 mod centre;
+mod interpolation;
 mod light_time;
 mod reader;
 mod support;

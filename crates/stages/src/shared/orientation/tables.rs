@@ -1,12 +1,10 @@
-//! Tables of an orientation for camera models, and their interpolation error.
+//! Tables of an orientation for camera models, and the interpolation between their nodes.
 
 use nalgebra::{Matrix3, Vector3, Vector4};
 use serde::{Deserialize, Serialize};
 
-use crate::tag_times::ImageTimes;
 use areograph_base::{
     body::Body,
-    error::Result,
     frames::{BodyFixed, CameraFrame, J2000, Position, Rotation, SpacecraftBus},
     time::Et,
 };
@@ -14,11 +12,7 @@ use areograph_geom::{
     attitude::{continuous_quaternions, matrix_of_spice_quaternion},
     body_rotation::spin_rad_s,
     lagrange::lagrange,
-    statistics::largest,
 };
-
-/// Points between two nodes at which the interpolation is compared with the kernels, shares of their distance.
-const CHECKED_AT: [f64; 3] = [0.25, 0.5, 0.75];
 
 /// Uniform tables from a little before to a little after the image, as camera models require.
 ///
@@ -89,28 +83,6 @@ impl InterpolationCheck {
     pub fn keeps_limit(&self) -> bool {
         self.error_max_px < Self::LIMIT_PX
     }
-
-    /// Compares the interpolated camera with `camera` between all nodes over the image.
-    pub(crate) fn of(
-        image: &ImageTimes,
-        tables: &CameraTables,
-        camera: impl Fn(Et) -> Result<Camera>,
-    ) -> Result<Self> {
-        let nodes = Nodes::new(tables);
-        let mut check = Self::default();
-        for pair in tables.et_s.windows(2) {
-            for share in CHECKED_AT {
-                let et = Et::from_seconds(pair[0] + share * (pair[1] - pair[0]));
-                if !image.exposures().contains(et) {
-                    continue;
-                }
-                let error_px = error_px(image, &camera(et)?, &nodes.camera(et));
-                check.error_max_px = largest([check.error_max_px, error_px]).unwrap_or_default();
-                check.epochs += 1;
-            }
-        }
-        Ok(check)
-    }
 }
 
 /// Position and rotation of the camera at one instant.
@@ -156,31 +128,39 @@ impl Nodes {
     /// The camera between the nodes.
     pub(crate) fn camera(&self, et: Et) -> Camera {
         let at = (et.seconds() - self.start_s) / self.step_s;
-        let camera_to_mars = matrix_of_spice_quaternion(lagrange(&self.camera_to_mars, at).into());
-        Camera {
-            position: Position::new(lagrange(&self.position_m, at)),
-            to_mars: Rotation::new(camera_to_mars, et),
+        camera(
+            lagrange(&self.position_m, at),
+            lagrange(&self.camera_to_mars, at),
+            et,
+        )
+    }
+
+    /// The camera of every node.
+    pub(super) fn cameras(&self) -> impl Iterator<Item = Camera> {
+        let nodes = self.position_m.iter().zip(&self.camera_to_mars);
+        nodes.enumerate().map(|(node, (position_m, to_mars))| {
+            let et_s = self.start_s + node as f64 * self.step_s;
+            camera(*position_m, *to_mars, Et::from_seconds(et_s))
+        })
+    }
+
+    /// Every second node, from the first or the second on.
+    pub(super) fn every_second(&self, first: usize) -> Self {
+        fn half<T: Copy>(all: &[T], first: usize) -> Vec<T> {
+            all.iter().skip(first).step_by(2).copied().collect()
+        }
+        Self {
+            start_s: self.start_s + first as f64 * self.step_s,
+            step_s: 2.0 * self.step_s,
+            position_m: half(&self.position_m, first),
+            camera_to_mars: half(&self.camera_to_mars, first),
         }
     }
 }
 
-/// Largest distance between the image coordinates of the same ground in two cameras, in image pixels, over the middle
-/// and both ends of a line; the ground is assumed at its shortest range, at nadir.
-fn error_px(image: &ImageTimes, kernels: &Camera, interpolated: &Camera) -> f64 {
-    let position_m = kernels.position.xyz_m;
-    let distance_m = position_m.norm() - image.body.model().equatorial_radius_m;
-    let detector = image.detector();
-    let pixel_rad =
-        image.instrument.optics.pixel_pitch_mm / image.instrument.optics.focal_length_mm;
-    let errors_px = [0.0, 0.5, 1.0].map(|share| {
-        let look = detector.look(share * detector.samples);
-        let ground_m = position_m + kernels.to_mars.matrix() * look * distance_m;
-        let seen =
-            interpolated.to_mars.matrix().transpose() * (ground_m - interpolated.position.xyz_m);
-        let missed = seen.xy() / seen.z - look.xy();
-        let lines = missed.x / f64::from(image.downtrack_summing);
-        let samples = missed.y / f64::from(image.crosstrack_summing);
-        lines.hypot(samples) / pixel_rad
-    });
-    largest(errors_px).unwrap_or_default()
+fn camera(position_m: Vector3<f64>, to_mars: Vector4<f64>, et: Et) -> Camera {
+    Camera {
+        position: Position::new(position_m),
+        to_mars: Rotation::new(matrix_of_spice_quaternion(to_mars.into()), et),
+    }
 }
