@@ -27,9 +27,9 @@ def best_s(work):
 
 def main(areograph, archive):
     def search(*arguments):
-        command = [areograph, "--quiet", "pedr", "search", archive, *arguments]
-        told = subprocess.run(command, check=True, capture_output=True).stdout
-        return json.loads(told)["rows"]
+        command = [areograph, "--quiet", "pedr", "search", archive, "--wide", "--json", *arguments]
+        answer = subprocess.run(command, check=True, capture_output=True).stdout
+        return json.loads(answer)["rows"]
 
     everything = pathlib.Path(archive, "shots.parquet")
     # Each shot of class 1 with a return; rows come in the order of time, as a user would sort them.
