@@ -587,7 +587,9 @@ static ROWS: [Row; 23] = [
         kind: Kind::Evidence,
         place: "figures",
         what: "Gusev point 77 outside a crater in one image and inside in the other, then outside in both; Isidis points 6–8",
-        account: Account::Data { printed: "visual comparison" },
+        account: Account::Data {
+            printed: "visual comparison",
+        },
         note: "",
     },
     Row {
