@@ -212,7 +212,7 @@ fn what_cannot_be_compared_is_refused() {
     refused(
         &command.output().unwrap(),
         3,
-        "no pair of images that shows a cause in 1 site",
+        "no pair of images in 1 site shows a cause",
     );
     let own = site_run("isidis");
     let mut command = areograph();

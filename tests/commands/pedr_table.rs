@@ -270,13 +270,13 @@ fn preferences_that_are_named_are_there_and_their_faults_have_a_line() {
     };
     assert_eq!(
         told("T\nT\nmaybe\n"),
-        "line 3 holds \"maybe\"; expected T or F"
+        "line 3 contains \"maybe\"; expected T or F"
     );
     assert_eq!(told("T\nT"), "ends after line 2; expected T or F");
     let limits = "T\n12*T\n".to_owned() + &"T\n".repeat(10) + "T 'x.TAB'\n-360.\nnan\n";
     assert_eq!(
         told(&limits.replacen("12*T", "T", 1)),
-        "line 15 holds \"nan\"; expected a number of degrees"
+        "line 15 contains \"nan\"; expected a number of degrees"
     );
 }
 

@@ -737,7 +737,7 @@ fn an_unknown_kind_of_events_is_refused() {
     let world = World::new();
     let refused = world.get("/events?kind=runs");
     assert_eq!(refused.status, 400);
-    assert!(refused.text().contains("not a kind of event"));
+    assert!(refused.text().contains("not a valid kind of event"));
     assert_eq!(world.get("/events?kind=").status, 200);
 }
 

@@ -379,7 +379,7 @@ static ROWS: [Row; 15] = [
         id: "A77-05",
         kind: Kind::Constants,
         place: "primary net",
-        what: "its accuracy",
+        what: "accuracy of the primary net",
         account: Account::Cited {
             printed: "a few km in the north, often worse than ±20 km in the south",
         },

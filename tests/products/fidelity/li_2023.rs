@@ -482,7 +482,7 @@ static ROWS: [Row; 25] = [
             from: "root of the sum of squares across and along",
             ours: || focal(&I864_AFTER),
         },
-        note: "As for L23-09. Control points in plan 5.650 and 5.254 px (145.314 and 144.605 m), height 63.978 m require data.",
+        note: "As for L23-09. Control points in plan (5.650 and 5.254 px; 145.314 and 144.605 m) and height (63.978 m) require data.",
     },
     Row {
         id: "L23-11",
@@ -493,7 +493,7 @@ static ROWS: [Row; 25] = [
             from: "root of the sum of squares across and along",
             ours: || focal(&DIRECT[0]),
         },
-        note: "As for L23-09. Plan 24.252 and 30.791 px (684.161 and 900.743 m), height 477.180 m require data.",
+        note: "As for L23-09. Plan (24.252 and 30.791 px; 684.161 and 900.743 m) and height (477.180 m) require data.",
     },
     Row {
         id: "L23-12",
@@ -504,7 +504,7 @@ static ROWS: [Row; 25] = [
             from: "root of the sum of squares across and along",
             ours: || focal(&DIRECT[1]),
         },
-        note: "As for L23-09. Plan 24.553 and 33.027 px (704.422 and 911.537 m), height 471.415 m require data.",
+        note: "As for L23-09. Plan (24.553 and 33.027 px; 704.422 and 911.537 m) and height (471.415 m) require data.",
     },
     Row {
         id: "L23-13",
@@ -515,7 +515,7 @@ static ROWS: [Row; 25] = [
             from: "root of the sum of squares across and along",
             ours: || focal(&DIRECT[2]),
         },
-        note: "As for L23-09. Plan 21.709 and 29.345 px (602.496 and 803.388 m), height 682.407 m require data.",
+        note: "As for L23-09. Plan (21.709 and 29.345 px; 602.496 and 803.388 m) and height (682.407 m) require data.",
     },
     Row {
         id: "L23-14",
@@ -526,7 +526,7 @@ static ROWS: [Row; 25] = [
             from: "root of the sum of squares across and along",
             ours: || focal(&CALIBRATED[0]),
         },
-        note: "As for L23-09. Plan 7.894 and 8.349 px (217.017 and 235.313 m), height 66.032 m require data.",
+        note: "As for L23-09. Plan (7.894 and 8.349 px; 217.017 and 235.313 m) and height (66.032 m) require data.",
     },
     Row {
         id: "L23-15",
@@ -537,7 +537,7 @@ static ROWS: [Row; 25] = [
             from: "root of the sum of squares across and along",
             ours: || focal(&CALIBRATED[1]),
         },
-        note: "As for L23-09. Plan 9.917 and 10.952 px (273.349 and 301.776 m), height 80.013 m require data. The second value \
+        note: "As for L23-09. Plan (9.917 and 10.952 px; 273.349 and 301.776 m) and height (80.013 m) require data. The second value \
                in plan exceeds the “better than 300 m” of the conclusions.",
     },
     Row {
@@ -549,7 +549,7 @@ static ROWS: [Row; 25] = [
             from: "root of the sum of squares across and along",
             ours: || focal(&CALIBRATED[2]),
         },
-        note: "As for L23-09. Plan 6.681 and 10.469 px (178.716 and 286.364 m), height 256.643 m require data. The row does \
+        note: "As for L23-09. Plan (6.681 and 10.469 px; 178.716 and 286.364 m) and height (256.643 m) require data. The row does \
                not meet “below 1 px” and “within 100 m”.",
     },
     Row {
@@ -579,7 +579,7 @@ static ROWS: [Row; 25] = [
         id: "L23-19",
         kind: Kind::Arithmetic,
         place: "abstract, key points, conclusions",
-        what: "gain",
+        what: "improvement",
         account: Account::Explained {
             from: "tables 5 to 7",
             ours: abstract_of_it,

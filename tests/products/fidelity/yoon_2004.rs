@@ -362,7 +362,7 @@ static ROWS: [Row; 23] = [
                 )
             },
         },
-        note: "As Y04-03.",
+        note: "As for Y04-03.",
     },
     Row {
         id: "Y04-06",
@@ -388,7 +388,7 @@ static ROWS: [Row; 23] = [
                 )
             },
         },
-        note: "As Y04-03.",
+        note: "As for Y04-03.",
     },
     Row {
         id: "Y04-08",
@@ -445,7 +445,7 @@ static ROWS: [Row; 23] = [
         note: "Along the track, the signs are opposite, and the disagreement equals that of the intersection \
                residuals. Across the track, areograph departs from the published model: the paper uses the position in \
                the measured line, where the skew of the flight causes a tenth of the along-track correction; areograph \
-               uses the line that sees the point (decision 0010), and the means vanish. Spreads are data.",
+               uses the line that sees the point (decision 0010), and the means vanish. The standard deviations require data.",
     },
     Row {
         id: "Y04-12",
@@ -501,7 +501,7 @@ static ROWS: [Row; 23] = [
                 )
             },
         },
-        note: "As Y04-10.",
+        note: "As for Y04-10.",
     },
     Row {
         id: "Y04-15",
@@ -547,7 +547,7 @@ static ROWS: [Row; 23] = [
             ours: isidis_sigmas,
         },
         note: "An adjustment with 10 m a priori cannot give 18.3 m: observations do not increase the standard \
-               deviation of an unknown. Ours obeys this.",
+               deviation of an unknown. The computed value satisfies this.",
     },
     Row {
         id: "Y04-19",
@@ -587,7 +587,9 @@ static ROWS: [Row; 23] = [
         kind: Kind::Evidence,
         place: "figures",
         what: "Gusev point 77 outside a crater in one image and inside in the other, then outside in both; Isidis points 6–8",
-        account: Account::Data { printed: "by eye" },
+        account: Account::Data {
+            printed: "visual comparison",
+        },
         note: "",
     },
     Row {

@@ -331,7 +331,7 @@ pub(super) static ROWS: [Row; 11] = [
         place: "table 4",
         what: "RMSE of E02-01453",
         account: Account::InPart {
-            from: "as S05-31",
+            from: "as for S05-31",
             ours: || sound(3, [SHOWN, HALF_A_METRE, SHOWN, ONE_PERCENT]),
         },
         note: "Pointing: S05-32.",
@@ -342,7 +342,7 @@ pub(super) static ROWS: [Row; 11] = [
         place: "table 4",
         what: "RMSE of E02-01301",
         account: Account::Explained {
-            from: "as S05-31",
+            from: "as for S05-31",
             ours: || isidis(4),
         },
         note: "The trajectory used in the paper has a defect: orbital motion departs from a parabola by 4 mm, not 2.3 \
@@ -354,7 +354,7 @@ pub(super) static ROWS: [Row; 11] = [
         place: "table 4",
         what: "RMSE of E02-02016",
         account: Account::Explained {
-            from: "as S05-31",
+            from: "as for S05-31",
             ours: || isidis(5),
         },
         note: "As for S05-36: orbital motion departs from a parabola by 15 mm.",

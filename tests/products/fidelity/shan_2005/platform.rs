@@ -115,7 +115,7 @@ fn resolution() -> Vec<Comparison> {
 }
 
 fn laser_rate() -> Vec<Comparison> {
-    vec![number("shots a second", "10", SHOTS as f64 / FRAME_S, 0).exact()]
+    vec![number("shots per second", "10", SHOTS as f64 / FRAME_S, 0).exact()]
 }
 
 fn laser_spot() -> Vec<Comparison> {

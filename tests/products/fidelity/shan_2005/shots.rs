@@ -20,7 +20,7 @@ static PASSES: LazyLock<[Pass; 2]> = LazyLock::new(|| {
 
 fn rate() -> Vec<Comparison> {
     // The clock of the laser is good to a thousandth.
-    vec![number("shots a second", "10", 1.0 / PASSES[0].interval_s, 4).within(0.01)]
+    vec![number("shots per second", "10", 1.0 / PASSES[0].interval_s, 4).within(0.01)]
 }
 
 fn spacing() -> Vec<Comparison> {

@@ -202,7 +202,7 @@ pub(super) static ROWS: [Row; 11] = [
         id: "S05-20",
         kind: Kind::ClosedLoop,
         place: "table 2",
-        what: "sum factor",
+        what: "summing factor",
         account: Account::Input {
             from: "labels of the synthetic mission",
             ours: summing,
