@@ -1,8 +1,9 @@
 //! Sums over the compared squares of all cells of a tile, whose squares overlap.
 
-use super::search::HALF;
 use crate::ground::Tile;
 
+/// Half the edge of the compared square, samples of the ground.
+pub(super) const HALF: usize = 8;
 /// Edge of the compared square, and its samples.
 pub(super) const EDGE: usize = 2 * HALF + 1;
 pub(super) const COUNT: usize = EDGE * EDGE;
