@@ -45,7 +45,7 @@ impl Patch {
             & samples.simd_lt(sample_end);
         let inside = inside.to_bitmask();
         // Of positive numbers the whole part.
-        let [rows, columns] = [lines, samples].map(|places| places.fast_trunc_int());
+        let [rows, columns] = [lines, samples].map(f32x4::fast_trunc_int);
         let one = i32x4::splat(1);
         let starts = (rows - one) * i32x4::splat(self.size[1] as i32) + (columns - one);
         let starts = starts.to_array();

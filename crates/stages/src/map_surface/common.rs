@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use super::{level::Level, search::HALF};
+use super::{level::Level, sums::HALF};
 use crate::{
     ground::Ground,
     image_view::{Prediction, View},

@@ -239,7 +239,7 @@ fn surface_of(common: &Common, cells: &[Cell]) -> Surface {
         values.get(values.len() / 2).copied().unwrap_or_default()
     };
     let sample_m = common.sample_m();
-    let compared_m = (2 * search::HALF + 1) as f64 * sample_m;
+    let compared_m = sums::EDGE as f64 * sample_m;
     let sizes = Sizes {
         columns: common.ground.size[1],
         compared_cells: compared_m / common.ground.cell_m,

@@ -7,12 +7,10 @@ use super::{
     level::{Known, Level},
     pair::Pair,
     seen::Seen,
-    sums::{COUNT, Lines, add_numbers, add_products, over_squares},
+    sums::{COUNT, HALF, Lines, add_numbers, add_products, over_squares},
 };
 use areograph_base::{error::Result, ties::Unmatched};
 
-/// Half the edge of the compared square, samples of the ground.
-pub(super) const HALF: usize = 8;
 /// Minimum correlation.
 const CORRELATION_MIN: f64 = 0.5;
 /// Largest share of the best correlation that another height may have.

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::{level::Level, search::HALF};
+use super::{level::Level, sums::HALF};
 use crate::ground::{Field, Sight, Tile};
 
 /// Samples of the ground along the edge of a tile: a thread holds some megabytes of both images.

@@ -11,9 +11,8 @@ use super::{
     Cell, Found,
     level::{Known, Level},
     pair::Pair,
-    search::HALF,
     seen::Seen,
-    sums::{COUNT, EDGE, Lines, add_numbers, add_products, over_squares},
+    sums::{COUNT, EDGE, HALF, Lines, add_numbers, add_products, over_squares},
 };
 use areograph_base::{error::Result, ties::Unmatched};
 
@@ -306,11 +305,13 @@ impl Fit {
             };
             let here = of_line(&template.0[0]);
             let [number, slope, aside] = other.0.each_ref().map(|of| of_line(of));
-            for at in 0..EDGE {
-                let fitted = offset + gain * number[at] + along * slope[at] + across * aside[at];
-                let influence =
-                    of_none + of_number * number[at] + of_along * slope[at] + of_across * aside[at];
-                moves[BEFORE + at] = influence * (here[at] - fitted);
+            let there = number.iter().zip(slope.iter().zip(&aside));
+            let samples = here.iter().zip(there);
+            for (moved, (here, (number, (slope, aside)))) in moves[BEFORE..].iter_mut().zip(samples)
+            {
+                let fitted = offset + gain * number + along * slope + across * aside;
+                let influence = of_none + of_number * number + of_along * slope + of_across * aside;
+                *moved = influence * (here - fitted);
             }
         }
         self.independent

@@ -1,8 +1,9 @@
 //! Sums over the compared squares of all cells of a tile, whose squares overlap.
 
-use super::search::HALF;
 use crate::ground::Tile;
 
+/// Half the edge of the compared square, samples of the ground.
+pub(super) const HALF: usize = 8;
 /// Edge of the compared square, and its samples.
 pub(super) const EDGE: usize = 2 * HALF + 1;
 pub(super) const COUNT: usize = EDGE * EDGE;
@@ -13,8 +14,8 @@ pub(super) type Lines<const N: usize> = [Vec<f32>; N];
 /// Calls `each` for every cell of a tile, in order, with the sums of `N` numbers over the square about its middle; NaN where
 /// a number is missing. `add` adds these numbers of a line of the tile.
 ///
-/// A number is added up once for all squares that contain the lines of its cell: sums over the lines of a cell are single,
-/// all others double.
+/// A number is added up once for all squares that contain all lines of its cell. Sums over the lines of a cell are in single
+/// precision, all others in double.
 pub(super) fn over_squares<const N: usize>(
     tile: &Tile,
     per_cell: usize,
