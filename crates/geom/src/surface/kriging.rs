@@ -120,8 +120,8 @@ impl Kriging {
             variogram,
             sill_m2,
             factor,
-            sum_of_ones,
             of_ones,
+            sum_of_ones,
             mean_m,
             strengths,
         })
