@@ -141,7 +141,7 @@ pub fn write_products<'a>(
                 }
                 continue;
             }
-            Scope::Image => &site.images[..],
+            Scope::Image => site.images,
             Scope::AdjustedImage => site
                 .adjustment()
                 .map_or(&[][..], |(_, adjustment)| adjustment.images),

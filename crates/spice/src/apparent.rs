@@ -6,10 +6,7 @@
 
 use std::cell::Cell;
 
-use super::{
-    ffi::{Called, Cspice, StateKm},
-    session::Session,
-};
+use super::ffi::{Called, Cspice, StateKm};
 use areograph_base::constants::NAIF_MARS;
 
 /// Time between instants at which the acceleration of Mars is computed, seconds.
@@ -47,24 +44,25 @@ fn acceleration(cspice: &Cspice, et: f64) -> Called<[f64; 3]> {
     Ok([0, 1, 2].map(change))
 }
 
-impl Session {
-    /// A body as seen from Mars.
-    pub(super) fn seen_from_mars(&self, target: i32, et: f64) -> Called<StateKm> {
-        let acceleration = acceleration(self.cspice(), et)?;
-        self.seen_by(target, et, acceleration)
-    }
+/// A body as seen from Mars.
+pub(super) fn seen_from_mars(cspice: &Cspice, target: i32, et: f64) -> Called<StateKm> {
+    seen_by(cspice, target, et, acceleration(cspice, et)?)
+}
 
-    /// A spacecraft close to Mars as seen from there.
-    ///
-    /// # Accuracy
-    /// An acceleration half a minute old changes the velocity of a spacecraft 4,000 km from the centre by 1e-10 m/s.
-    pub(super) fn orbiter_seen_from_mars(&self, target: i32, et: f64) -> Called<StateKm> {
-        let acceleration = self.mars_acceleration().near(self.cspice(), et)?;
-        self.seen_by(target, et, acceleration)
-    }
+/// A spacecraft close to Mars as seen from there.
+///
+/// # Accuracy
+/// An acceleration half a minute old changes the velocity of a spacecraft 4,000 km from the centre by 1e-10 m/s.
+pub(super) fn orbiter_seen_from_mars(
+    cspice: &Cspice,
+    mars: &MarsAcceleration,
+    target: i32,
+    et: f64,
+) -> Called<StateKm> {
+    seen_by(cspice, target, et, mars.near(cspice, et)?)
+}
 
-    fn seen_by(&self, target: i32, et: f64, acceleration: [f64; 3]) -> Called<StateKm> {
-        let mars = self.cspice().barycentric_state(NAIF_MARS, et)?;
-        self.cspice().apparent_state(target, et, mars, acceleration)
-    }
+fn seen_by(cspice: &Cspice, target: i32, et: f64, acceleration: [f64; 3]) -> Called<StateKm> {
+    let mars = cspice.barycentric_state(NAIF_MARS, et)?;
+    cspice.apparent_state(target, et, mars, acceleration)
 }

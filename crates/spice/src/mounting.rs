@@ -6,18 +6,8 @@ use std::{
     ffi::{CStr, CString},
 };
 
-use super::{
-    ffi::{Called, Cspice, Rows},
-    needs::{bus_frame, camera_frame},
-    session::{Session, matrix},
-};
-use areograph_base::{
-    error::Result,
-    frames::{CameraFrame, Rotation, SpacecraftBus},
-    instruments::Instrument,
-    time::Et,
-};
-use areograph_geom::body_rotation::frame_rotation_3;
+use super::ffi::{Called, Cspice, Rows};
+use areograph_base::time::Et;
 
 /// Class of frames with a constant rotation from another frame (`TK`).
 const CONSTANT_CLASS: i32 = 4;
@@ -29,38 +19,18 @@ const CHAIN_MAX: usize = 10;
 #[derive(Debug, Default)]
 pub(super) struct FixedMountings(RefCell<BTreeMap<[CString; 2], Option<Rows>>>);
 
-impl Session {
-    /// Mounting of `instrument` by the loaded kernels, converted to its camera axes.
-    ///
-    /// # Errors
-    /// [`SpiceError::MissingText`](super::SpiceError::MissingText) when no loaded kernel defines the two frames.
-    pub fn mounting(
-        &self,
-        instrument: &Instrument,
-        et: Et,
-    ) -> Result<Rotation<SpacecraftBus, CameraFrame>> {
-        let frames = [&instrument.naif.bus_frame, &instrument.naif.frame]
-            // A name with a zero byte is truncated there, and then no kernel defines it.
-            .map(|name| CString::new(name.split('\0').next().unwrap_or_default()))
-            .map(std::result::Result::unwrap_or_default);
-        let rows = self.mounting_rows(frames, et).map_err(|error| {
-            let needs = [camera_frame(instrument), bus_frame(instrument.spacecraft)];
-            self.explain(error, &needs)
-        })?;
-        let turn = frame_rotation_3(instrument.naif.turn_rad);
-        Ok(Rotation::new(turn * matrix(&rows), et))
-    }
-
-    fn mounting_rows(&self, frames: [CString; 2], et: Et) -> Called<Rows> {
-        let known = self.mountings().0.borrow().get(&frames).copied();
+impl FixedMountings {
+    /// Matrix from the frame of the bus to that of the camera, by rows.
+    pub(super) fn rows(&self, cspice: &Cspice, frames: [CString; 2], et: Et) -> Called<Rows> {
+        let known = self.0.borrow().get(&frames).copied();
         if let Some(Some(rows)) = known {
             return Ok(rows);
         }
         let [bus, camera] = &frames;
-        let rows = self.cspice().frame_matrix(bus, camera, et.seconds())?;
+        let rows = cspice.frame_matrix(bus, camera, et.seconds())?;
         if known.is_none() {
-            let constant = is_constant(self.cspice(), bus, camera)?.then_some(rows);
-            self.mountings().0.borrow_mut().insert(frames, constant);
+            let constant = is_constant(cspice, bus, camera)?.then_some(rows);
+            self.0.borrow_mut().insert(frames, constant);
         }
         Ok(rows)
     }

@@ -12,13 +12,13 @@ use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    apparent::MarsAcceleration,
+    apparent::{MarsAcceleration, orbiter_seen_from_mars, seen_from_mars},
     coverage::Coverage,
     error::SpiceError,
     ffi::{Cspice, Rows, StateKm},
     kernels::KernelSet,
     mounting::FixedMountings,
-    needs::{LEAP_SECONDS, Need, clocks, explain},
+    needs::{LEAP_SECONDS, Need, bus_frame, camera_frame, clocks, explain},
     origin::{self, Origin, all_finite},
     role::KernelRole,
 };
@@ -26,10 +26,12 @@ use areograph_base::{
     body::Body,
     constants::{NAIF_MARS, NAIF_SOLAR_SYSTEM_BARYCENTRE, NAIF_SUN, SPACECRAFT, Spacecraft},
     error::{Error, Locate, Result},
-    frames::{J2000, Position, Rotation, SpacecraftBus},
+    frames::{CameraFrame, J2000, Position, Rotation, SpacecraftBus},
+    instruments::Instrument,
     time::{CkLookup, Et},
     units::METRES_PER_KM,
 };
+use areograph_geom::body_rotation::frame_rotation_3;
 
 /// Digits of a second in UTC strings for people.
 const UTC_DECIMALS: u8 = 3;
@@ -142,14 +144,6 @@ impl Session {
         &self.loaded.cspice
     }
 
-    pub(super) fn mountings(&self) -> &FixedMountings {
-        &self.loaded.mountings
-    }
-
-    pub(super) fn mars_acceleration(&self) -> &MarsAcceleration {
-        &self.loaded.mars_acceleration
-    }
-
     /// The version of CSPICE, for example `CSPICE_N0067`.
     ///
     /// # Errors
@@ -184,7 +178,7 @@ impl Session {
     }
 
     /// An error of CSPICE, or the missing kernel that explains it.
-    pub(super) fn explain(&self, error: SpiceError, needs: &[Need]) -> SpiceError {
+    fn explain(&self, error: SpiceError, needs: &[Need]) -> SpiceError {
         explain(self.kernels(), error, needs)
     }
 
@@ -256,7 +250,12 @@ impl Session {
     /// # Errors
     /// As [`Self::state`].
     pub fn apparent_state(&self, et: Et) -> Result<State> {
-        let state = self.orbiter_seen_from_mars(self.spacecraft.naif, et.seconds())?;
+        let state = orbiter_seen_from_mars(
+            self.cspice(),
+            &self.loaded.mars_acceleration,
+            self.spacecraft.naif,
+            et.seconds(),
+        )?;
         self.finite(
             "apparent position or velocity",
             &self.spacecraft.name,
@@ -281,16 +280,14 @@ impl Session {
     /// # Errors
     /// [`SpiceError::NoSun`] when the kernels do not hold the Sun when its light left; as [`Self::state`].
     pub fn sun_state(&self, et: Et) -> Result<State> {
-        let state = self
-            .seen_from_mars(NAIF_SUN, et.seconds())
-            .map_err(|error| {
-                if error.is_coverage() {
-                    let utc = self.et_to_utc(et).unwrap_or_else(|_| "unknown".to_owned());
-                    SpiceError::NoSun { seen: et, utc }
-                } else {
-                    error
-                }
-            })?;
+        let state = seen_from_mars(self.cspice(), NAIF_SUN, et.seconds()).map_err(|error| {
+            if error.is_coverage() {
+                let utc = self.et_to_utc(et).unwrap_or_else(|_| "unknown".to_owned());
+                SpiceError::NoSun { seen: et, utc }
+            } else {
+                error
+            }
+        })?;
         self.finite("apparent position or velocity", "the Sun", et, state)
     }
 
@@ -376,6 +373,28 @@ impl Session {
         Ok(ticks.map_err(|error| self.explain(error, &clocks(self.spacecraft)))?)
     }
 
+    /// Mounting of `instrument` by the loaded kernels, converted to its camera axes.
+    ///
+    /// # Errors
+    /// [`SpiceError::MissingText`] when no loaded kernel defines the two frames.
+    pub fn mounting(
+        &self,
+        instrument: &Instrument,
+        et: Et,
+    ) -> Result<Rotation<SpacecraftBus, CameraFrame>> {
+        let frames = [&instrument.naif.bus_frame, &instrument.naif.frame]
+            // A name with a zero byte is truncated there, and then no kernel defines it.
+            .map(|name| CString::new(name.split('\0').next().unwrap_or_default()))
+            .map(std::result::Result::unwrap_or_default);
+        let rows = self.loaded.mountings.rows(self.cspice(), frames, et);
+        let rows = rows.map_err(|error| {
+            let needs = [camera_frame(instrument), bus_frame(instrument.spacecraft)];
+            self.explain(error, &needs)
+        })?;
+        let turn = frame_rotation_3(instrument.naif.turn_rad);
+        Ok(Rotation::new(turn * matrix(&rows), et))
+    }
+
     /// Matrix from J2000 to the frame of `body` in the loaded planetary constants, to identify the IAU report they
     /// follow.
     ///
@@ -389,6 +408,6 @@ impl Session {
     }
 }
 
-pub(super) fn matrix(rows: &Rows) -> Matrix3<f64> {
+fn matrix(rows: &Rows) -> Matrix3<f64> {
     Matrix3::from_fn(|row, column| rows[row][column])
 }

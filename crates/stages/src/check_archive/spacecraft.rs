@@ -70,7 +70,8 @@ impl<'a> StateGrid<'a> {
     /// kernels may have a step.
     ///
     /// # Accuracy
-    /// 1e-9 m: the sixth derivative of an orbit of 3,800 km in the rotating frame of Mars is 3e-12 m/s⁶.
+    /// 1e-6 m: the sixth derivative of an orbit of 3,800 km in the rotating frame of Mars is 3e-12 m/s⁶, which leaves 1e-9 m;
+    /// more is from the error of the polynomials of the trajectory, which oscillates faster.
     fn state(&mut self, at: Et) -> Option<SpacecraftState> {
         let place = at.seconds() / GRID_S;
         // Written so that NaN does not count as within.
