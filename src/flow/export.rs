@@ -7,6 +7,7 @@ use std::{
 
 use crate::{
     capabilities::declarations,
+    column::require_kept,
     config::ShotFormat,
     error::{Cause, IoError, Locate, Result},
     files::PartialFolder,
@@ -83,6 +84,7 @@ fn write(site: &SiteProducts, formats: &[ShotFormat], to: &Path) -> Result<Vec<(
         .map_err(IoError::on("make a temporary folder in"))
         .in_file(to)?;
     let products = export_footprints(draft.path(), site, formats)?;
+    require_kept()?;
     let files = products.into_iter().map(|product| {
         let path = to.join(&product.path);
         fs::rename(draft.path().join(&product.path), &path)

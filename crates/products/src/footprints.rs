@@ -15,7 +15,10 @@ use super::{
     table::{Meaning, Table, meanings},
     text_table,
 };
-use areograph_base::{footprints::Footprints, frames::BodyFixed, schema::DocumentSchema, utc::Utc};
+use areograph_base::{
+    column::Column, footprints::Footprints, frames::BodyFixed, packed::Packed,
+    schema::DocumentSchema, utc::Utc,
+};
 use areograph_config::ShotFormat;
 use areograph_geom::ellipsoid::{AreocentricLatitude, spherical_to_xyz_m};
 
@@ -53,7 +56,7 @@ pub(super) static PARQUET: Declaration = Declaration {
     role: Role::Data,
     content: Content::Table(|| meanings(&columns())),
     write: Write::Site(|path, of| {
-        let bounds = bounding_box_deg(&points_deg(of.site));
+        let bounds = bounding_box_deg(points_deg(of.site));
         let mut metadata = vec![
             (
                 "geo",
@@ -108,11 +111,11 @@ pub(super) trait ShotNames: Sync {
 
 impl ShotNames for SiteProducts<'_> {
     fn windows(&self, row: usize) -> String {
-        self.window_ids(self.footprints.windows[row])
+        self.window_ids(self.footprints.windows.at(row))
     }
 
     fn utc(&self, row: usize) -> Utc {
-        self.utc[row]
+        self.utc.at(row)
     }
 }
 
@@ -147,8 +150,8 @@ impl<'a> Shot<'a> {
     }
 
     /// The column of footprints that `of` picks, in the shot's row.
-    pub(super) fn get<T: Copy>(&self, of: fn(&Footprints<BodyFixed>) -> &Vec<T>) -> T {
-        of(self.footprints)[self.row]
+    pub(super) fn get<T: Packed>(&self, of: fn(&Footprints<BodyFixed>) -> &Column<T>) -> T {
+        of(self.footprints).at(self.row)
     }
 
     pub(super) fn utc(&self) -> Utc {
@@ -226,7 +229,9 @@ pub(super) fn schema() -> DocumentSchema {
 }
 
 /// Longitude (-180..180) and latitude of every footprint, degrees.
-pub(super) fn points_deg(site: &SiteProducts) -> Vec<[f64; 2]> {
+pub(super) fn points_deg<'a>(
+    site: &'a SiteProducts<'a>,
+) -> impl Iterator<Item = [f64; 2]> + Clone + 'a {
     let rows = 0..site.footprints.len();
-    rows.map(|row| Shot::of(site, row).point_deg()).collect()
+    rows.map(|row| Shot::of(site, row).point_deg())
 }

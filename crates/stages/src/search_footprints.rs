@@ -273,7 +273,8 @@ impl Gathered<'_> {
 impl Sink for Gathered<'_> {
     fn found(&mut self, file: usize, mut found: Found) -> Result<()> {
         let result = &mut self.result;
-        found.footprints.file.fill(self.searched[file]);
+        let searched = self.searched[file];
+        found.footprints.file = found.footprints.file.changed(|_, _| searched);
         result.footprints.append(found.footprints);
         let room = COMPLAINTS_MAX.saturating_sub(result.complaints.len());
         result

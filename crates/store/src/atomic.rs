@@ -3,7 +3,11 @@
 //! Files are written under a temporary name, read back, flushed and renamed. The next command that writes into a folder
 //! removes the remains of a killed one.
 
-use std::{fs::File, io::Write as _, path::Path};
+use std::{
+    fs::File,
+    io::{self, Read, Write as _},
+    path::Path,
+};
 
 use crate::files::{Mark, StagedFile};
 use areograph_base::error::{IoError, Locate, Result};
@@ -24,6 +28,17 @@ pub fn write_parts(path: &Path, parts: &[&[u8]]) -> Result<()> {
     finish(StagedFile::create(path)?, parts)
 }
 
+/// Writes `head`, and behind it all that `payload` contains.
+///
+/// # Errors
+/// As [`write()`]; `payload` cannot be read.
+pub fn write_from(path: &Path, head: &[u8], payload: &mut impl Read) -> Result<()> {
+    write_with(StagedFile::create(path)?, |writer| {
+        writer.write_all(head)?;
+        io::copy(payload, writer).map(drop)
+    })
+}
+
 /// Writes at a path of the user, where an existing file is replaced only if it has this mark.
 ///
 /// # Errors
@@ -33,9 +48,14 @@ pub fn replace(path: &Path, bytes: &[u8], mark: Mark) -> Result<()> {
 }
 
 fn finish(staged: StagedFile, parts: &[&[u8]]) -> Result<()> {
+    write_with(staged, |writer| {
+        parts.iter().try_for_each(|part| writer.write_all(part))
+    })
+}
+
+fn write_with(staged: StagedFile, write: impl FnOnce(&mut File) -> io::Result<()>) -> Result<()> {
     let path = staged.path().to_owned();
-    let mut writer = staged.writer()?;
-    let written = parts.iter().try_for_each(|part| writer.write_all(part));
+    let written = write(&mut staged.writer()?);
     written.map_err(IoError::on("write")).in_file(&path)?;
     staged.finish()?;
     sync_folder(path.parent().unwrap_or(Path::new(".")));
