@@ -14,7 +14,7 @@ use std::{
 use crate::error::{Cause, Result};
 
 /// Bytes of packed pieces that a process holds in memory; more lie in a temporary file.
-pub const MEMORY_BYTES: usize = 1 << 25;
+pub const MEMORY_BYTES: usize = 1 << 22;
 /// Bytes of a temporary file, after which the next one begins: a file disappears with its last piece.
 const FILE_BYTES: u64 = 1 << 28;
 
@@ -103,12 +103,11 @@ impl Kept {
                 start,
                 length,
             } => {
-                let mut bytes = vec![0; *length];
-                if file.read_exact_at(&mut bytes, *start).is_err() {
+                let read = read(file, *start, *length);
+                if read.is_err() {
                     LOST.store(true, Ordering::Relaxed);
-                    bytes.clear();
                 }
-                Cow::Owned(bytes)
+                Cow::Owned(read.unwrap_or_default())
             }
         }
     }
@@ -120,6 +119,12 @@ impl Drop for Kept {
             IN_MEMORY.fetch_sub(bytes.len(), Ordering::Relaxed);
         }
     }
+}
+
+fn read(file: &File, start: u64, length: usize) -> io::Result<Vec<u8>> {
+    let mut bytes = vec![0; length];
+    file.read_exact_at(&mut bytes, start)?;
+    Ok(bytes)
 }
 
 /// Writes a piece to the temporary file, and returns where it begins.
@@ -150,6 +155,12 @@ mod tests {
             assert!(matches!(piece.place, Place::File { .. }));
             assert_eq!(*piece.bytes(), vec![number; 1 + usize::from(number)]);
         }
+        let Place::File { file, start, .. } = &pieces[99].place else {
+            panic!("not in a file");
+        };
+        // More than there is: the last piece cannot be read.
+        assert_eq!(read(file, *start, 100).unwrap(), vec![99; 100]);
+        assert!(read(file, *start, 1 << 30).is_err());
         let inside = Kept::within(usize::MAX, vec![1, 2]);
         assert!(matches!(inside.place, Place::Memory(_)));
         assert_eq!(*inside.bytes(), [1, 2]);
