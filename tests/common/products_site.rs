@@ -599,7 +599,7 @@ fn ranges(profiles: &[Profile]) -> RangeCheck {
             shots.outlier.push(k == 17);
         }
     }
-    let summary = Summary::of(&shots.range_minus_distance_m);
+    let summary = Summary::over(|| shots.range_minus_distance_m.iter());
     RangeCheck {
         profiles: profiles
             .iter()
@@ -612,7 +612,7 @@ fn ranges(profiles: &[Profile]) -> RangeCheck {
                     ..summary
                 },
                 range_minus_distance_crossover_m: summary,
-                decoding_m: Summary::of(&shots.decoding_m),
+                decoding_m: Summary::over(|| shots.decoding_m.iter()),
                 spacecraft_m: [summary; 3],
                 mean_without_outliers_m: -2.0,
                 decoding_without_outliers_m: 0.001,

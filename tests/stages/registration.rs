@@ -81,7 +81,7 @@ fn footprints_under_the_boresight_come_back_to_their_lines() {
             .points
             .line
             .iter()
-            .filter(|line| (0.0..=1280.0).contains(*line));
+            .filter(|line| (0.0..=1280.0).contains(line));
         assert_eq!(found.points.inside_count(), inside.count());
     }
 }
@@ -112,7 +112,7 @@ fn iterations_are_counted_for_every_point_within_the_lines() {
         assert!(
             untried
                 .into_iter()
-                .all(|(count, beyond)| (*count == 0) == *beyond)
+                .all(|(count, beyond)| (count == 0) == beyond)
         );
     }
 }

@@ -253,16 +253,22 @@ impl<'de, T: Packed> Deserialize<'de> for Column<T> {
             let expected = if is_full { PIECE } else { count % PIECE };
             (values.len() == expected).then_some(())?;
             Some(if is_full {
-                (Some(Arc::new(Kept::new(bytes.to_vec()))), Vec::new())
+                Self {
+                    pieces: vec![Arc::new(Kept::new(bytes.to_vec()))],
+                    rest: Vec::new(),
+                }
             } else {
-                (None, values)
+                Self {
+                    pieces: Vec::new(),
+                    rest: values,
+                }
             })
         });
-        let read: Option<Vec<(Option<Arc<Kept>>, Vec<T>)>> = read.collect();
+        let read: Option<Vec<Self>> = read.collect();
         let mut column = Self::new();
-        for (piece, values) in read.ok_or_else(damaged)? {
-            column.pieces.extend(piece);
-            column.rest.extend(values);
+        for part in read.ok_or_else(damaged)? {
+            column.pieces.extend(part.pieces);
+            column.rest.extend(part.rest);
         }
         (column.len() == count)
             .then_some(column)

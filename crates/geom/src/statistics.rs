@@ -339,6 +339,25 @@ mod tests {
     }
 
     #[test]
+    fn a_summary_over_many_values_is_that_of_a_list_bit_for_bit() {
+        let values = |count: usize| {
+            // Of both signs, with repetitions, and not in order.
+            (0..count).map(|index| ((index * 7_919) % 100_003) as f64 / 64.0 - 500.0)
+        };
+        for count in [0, 1, 2, HELD_MAX, HELD_MAX + 1, HELD_MAX + 2, 3 * HELD_MAX] {
+            let list: Vec<f64> = values(count).collect();
+            assert_eq!(
+                Summary::over(|| values(count)),
+                Summary::of(&list),
+                "{count}"
+            );
+        }
+        let equal = || std::iter::repeat_n(-0.25, 2 * HELD_MAX);
+        let list: Vec<f64> = equal().collect();
+        assert_eq!(Summary::over(equal), Summary::of(&list));
+    }
+
+    #[test]
     fn the_largest_of_some_is_none_of_those_that_are_no_number() {
         close(largest([-3.0, -1.0, -2.0]).unwrap(), -1.0);
         assert_eq!(largest([]), None);

@@ -127,6 +127,22 @@ mod tests {
     }
 
     #[test]
+    fn cells_of_longitudes_give_the_widest_stretch_of_sorted_ones() {
+        // Multiples of an irrational angle: dense ones have no stretch as wide as a cell.
+        for (count, part_deg) in [(1, 360.0), (7, 360.0), (1_000, 200.0), (200_000, 360.0)] {
+            let longitudes = (1..=count).map(|index| {
+                let turns = f64::from(index) * 0.618_033_988_749_894_9;
+                turns.fract() * part_deg - 180.0
+            });
+            let mut sorted: Vec<f64> = longitudes.clone().collect();
+            sorted.sort_by(f64::total_cmp);
+            let expected = widest_stretch(sorted.into_iter()).unwrap();
+            let found = bounding_box_deg(longitudes.map(|east| [east, 0.0])).unwrap();
+            assert_eq!([found[0], found[2]], [expected[0], expected[1]], "{count}");
+        }
+    }
+
+    #[test]
     fn boxes_round_a_pole_reach_it() {
         let round = |latitude: f64| [-170.0, -50.0, 60.0, 160.0].map(|east| [east, latitude]);
         let north = Some([-180.0, 86.0, 180.0, 90.0]);
