@@ -12,9 +12,9 @@ pub mod flow;
 pub mod worker;
 
 pub use areograph_base::{
-    altimetry, body, constants, error, footprints, frames, image, instruments, kernel_names,
-    kernel_source, line_times, minus, schema, stored, terms, ties, time, units, utc, verdict,
-    watch,
+    altimetry, body, column, constants, error, footprints, frames, image, instruments,
+    kernel_names, kernel_source, line_times, minus, schema, stored, terms, ties, time, units, utc,
+    verdict, watch,
 };
 pub use areograph_config as config;
 pub use areograph_fetch as fetch;

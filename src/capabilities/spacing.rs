@@ -146,14 +146,14 @@ fn region(shape: &WindowShape) -> Option<Region> {
 /// Index of the file of a profile.
 fn file(footprints: &Footprints<BodyFixed>, profile: &Profile) -> Option<u16> {
     let first = profile.rows.first()?;
-    Some(footprints.file[*first as usize])
+    Some(footprints.file.at(*first as usize))
 }
 
 /// Rows of a profile, one per pulse.
 fn pulses(footprints: &Footprints<BodyFixed>, rows: &[u32]) -> Vec<usize> {
     let mut pulses: Vec<usize> = rows.iter().map(|row| *row as usize).collect();
     let et_s = &footprints.et_s;
-    pulses.dedup_by(|later, earlier| (et_s[*later] - et_s[*earlier]).abs() < SAME_PULSE_S);
+    pulses.dedup_by(|later, earlier| (et_s.at(*later) - et_s.at(*earlier)).abs() < SAME_PULSE_S);
     pulses
 }
 
@@ -165,7 +165,7 @@ fn periods_s(footprints: &Footprints<BodyFixed>, profiles: &[Profile]) -> BTreeM
             continue;
         };
         let pulses = pulses(footprints, &profile.rows);
-        let et_s = |row: usize| footprints.et_s[row];
+        let et_s = |row: usize| footprints.et_s.at(row);
         let of_profile = pulses.windows(2).map(|pair| et_s(pair[1]) - et_s(pair[0]));
         intervals_s.entry(file).or_default().extend(of_profile);
     }
@@ -192,9 +192,9 @@ fn spacing(
     let rows = pulses(footprints, rows);
     let place = |row: usize| {
         spherical_to_xyz_m(
-            footprints.longitude_rad[row],
-            footprints.latitude_rad[row],
-            footprints.radius_m[row],
+            footprints.longitude_rad.at(row),
+            footprints.latitude_rad.at(row),
+            footprints.radius_m.at(row),
         )
     };
     let (mut missing, mut gap_m, mut spacings_m) = (0, None, Vec::new());
@@ -202,7 +202,7 @@ fn spacing(
         let [one, other] = [place(pair[0]), place(pair[1])];
         // Along the arc at the mean radius.
         let distance_m = one.angle(&other) * f64::midpoint(one.norm(), other.norm());
-        let time_s = footprints.et_s[pair[1]] - footprints.et_s[pair[0]];
+        let time_s = footprints.et_s.at(pair[1]) - footprints.et_s.at(pair[0]);
         let pulses = period_s.map_or(1.0, |period_s| (time_s / period_s).round().max(1.0));
         let lost = pulses as u32 - 1;
         let inside = (1..=lost).filter(|pulse| {

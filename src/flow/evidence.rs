@@ -213,7 +213,7 @@ fn same_exposures(images: &[JudgedImage]) -> Vec<String> {
 /// files have shots. A pattern most of whose files have none searches an archive.
 fn empty_pedr_files(config: &SiteConfig, site: &Site) -> Result<Option<String>> {
     let footprints = &site.book.of::<Converted>()?.footprints;
-    let with_shots: BTreeSet<u16> = footprints.file.iter().copied().collect();
+    let with_shots: BTreeSet<u16> = footprints.file.iter().collect();
     let files = footprints.files.iter().zip(0_u16..);
     let files: Vec<(&SourceFile, bool)> = files
         .map(|(file, index)| (file, with_shots.contains(&index)))

@@ -7,6 +7,7 @@ use std::{
 
 use crate::{
     capabilities::declarations,
+    column::require_kept,
     config::ShotFormat,
     error::{Cause, IoError, Locate, Result},
     files::PartialFolder,
@@ -84,6 +85,7 @@ fn write(site: &SiteProducts, formats: &[ShotFormat], to: &Path) -> Result<Vec<(
         .map_err(IoError::on("make a temporary folder in"))
         .in_file(to)?;
     let products = export_footprints(draft.path(), site, formats)?;
+    require_kept()?;
     let written = products.iter();
     let written: Vec<PathBuf> = written
         .map(|product| draft.path().join(&product.path))

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use crate::{
     capabilities::{declarations, page},
+    column::require_kept,
     error::{Cause, Locate, Result},
     products::{PAGE_DATA, PageData, REPORT},
     store::{
@@ -46,6 +47,7 @@ pub fn page_again(folder: &Path) -> Result<PageAgain> {
     let page = data
         .with(declarations(), page)
         .in_file(folder.join(PAGE_DATA))?;
+    require_kept()?;
     Ok(PageAgain {
         site: manifest.site.clone(),
         page,

@@ -315,14 +315,14 @@ impl Answer {
     /// Detects rows that precede an earlier row in time, or that an earlier file contains as well.
     fn follow(&mut self, file: usize, footprints: &Footprints<AsRead>) {
         for (record, tag_s) in footprints.record.iter().zip(&footprints.et_tag_s) {
-            let holder = self.seen.take(file, *tag_s);
-            let later = self.latest.filter(|(_, latest_s)| tag_s < latest_s);
+            let holder = self.seen.take(file, tag_s);
+            let later = self.latest.filter(|(_, latest_s)| tag_s < *latest_s);
             if let Some(before) = holder.or(later.map(|(before, _)| before)) {
                 let name = |file: usize| self.files[file].name.clone();
                 let (disorder, _) = self.disorder.get_or_insert_with(|| {
                     let disorder = NotInOrder {
                         rows: 0,
-                        record: *record,
+                        record,
                         before: name(before),
                     };
                     (disorder, PathBuf::from(name(file)))
@@ -330,7 +330,7 @@ impl Answer {
                 disorder.rows += 1;
             }
             if later.is_none() {
-                self.latest = Some((file, *tag_s));
+                self.latest = Some((file, tag_s));
             }
         }
     }

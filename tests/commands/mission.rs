@@ -237,7 +237,12 @@ fn the_scan_finds_the_injected_clock_bias_on_off_nadir_profiles() {
         {
             let (index, profile) = of_truth(&found, truth).unwrap();
             let rows = &profile.rows;
-            if found.footprints.off_nadir_rad[rows[rows.len() / 2] as usize] < 0.1 {
+            if found
+                .footprints
+                .off_nadir_rad
+                .at(rows[rows.len() / 2] as usize)
+                < 0.1
+            {
                 continue;
             }
             off_nadir += 1;
@@ -437,9 +442,9 @@ fn the_three_readings_of_the_clock_bias_differ_as_told() {
         for row in 0..stay.len() {
             let place = |of: &Footprints<BodyFixed>| {
                 spherical_to_xyz_m(
-                    of.longitude_rad[row],
-                    of.latitude_rad[row],
-                    of.radius_m[row],
+                    of.longitude_rad.at(row),
+                    of.latitude_rad.at(row),
+                    of.radius_m.at(row),
                 )
             };
             let moved_m = (place(&moved) - place(&stay)).norm();

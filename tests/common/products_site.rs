@@ -7,6 +7,7 @@ use areograph::{
     body::Body,
     body::Datum,
     capabilities::declarations,
+    column::Column,
     config::{
         KernelsConfig, OrientationConfig, PedrConfig, PointingConfig, ProductsConfig,
         RangeCheckConfig, ShotFormat, SiteConfig, WindowConfig, usual_instrument,
@@ -46,6 +47,7 @@ use areograph::{
     time::{Et, Interval, Intervals},
     utc::Utc,
 };
+use areograph_testing::replace;
 use nalgebra::{Matrix3, Vector3};
 
 /// Shots of the profile; one in ten seconds lies on either side of the antimeridian.
@@ -62,7 +64,7 @@ pub(crate) struct Site {
     pub(crate) orientation: Orientation,
     pub(crate) model: SensorModel,
     pub(crate) footprints: Footprints<BodyFixed>,
-    pub(crate) utc: Vec<Utc>,
+    pub(crate) utc: Column<Utc>,
     pub(crate) profiles: Vec<Profile>,
     pub(crate) ranges: RangeCheck,
     pub(crate) registration: ImageRegistration,
@@ -146,8 +148,10 @@ impl Site {
         for k in 0..SHOTS {
             let row = k as usize;
             let from_pole_rad = 0.002 * (f64::from(k) - 29.5);
-            site.footprints.latitude_rad[row] = std::f64::consts::FRAC_PI_2 - from_pole_rad.abs();
-            site.footprints.longitude_rad[row] = if from_pole_rad < 0.0 { 1.0 } else { 4.2 };
+            let latitude_rad = std::f64::consts::FRAC_PI_2 - from_pole_rad.abs();
+            let longitude_rad = if from_pole_rad < 0.0 { 1.0 } else { 4.2 };
+            replace(&mut site.footprints.latitude_rad, row, latitude_rad);
+            replace(&mut site.footprints.longitude_rad, row, longitude_rad);
         }
         site.orientation.outline = Some(
             [0.3, 1.9, 3.4, 5.0]
@@ -164,7 +168,7 @@ impl Site {
     pub(crate) fn empty() -> Self {
         let mut site = Self::small();
         site.footprints = Footprints::new(site.footprints.files.clone());
-        site.utc.clear();
+        site.utc = Column::new();
         site.profiles.clear();
         site.ranges = ranges(&[]);
         site
@@ -409,10 +413,10 @@ pub(crate) fn move_under_the_camera(footprints: &mut Footprints<BodyFixed>, mode
         let pose = camera.pose(line_offset(row));
         let boresight = pose.mars_to_camera.row(2).transpose();
         let ground = Spherical::from_xyz_m(&(pose.position_m + boresight * 380_000.0));
-        footprints.radius_m[row] = ground.radius_m;
-        footprints.radius_crossover_m[row] = ground.radius_m;
-        footprints.latitude_rad[row] = ground.latitude.0;
-        footprints.longitude_rad[row] = ground.longitude_rad;
+        replace(&mut footprints.radius_m, row, ground.radius_m);
+        replace(&mut footprints.radius_crossover_m, row, ground.radius_m);
+        replace(&mut footprints.latitude_rad, row, ground.latitude.0);
+        replace(&mut footprints.longitude_rad, row, ground.longitude_rad);
     }
 }
 
@@ -595,7 +599,7 @@ fn ranges(profiles: &[Profile]) -> RangeCheck {
             shots.outlier.push(k == 17);
         }
     }
-    let summary = Summary::of(&shots.range_minus_distance_m);
+    let summary = Summary::over(|| shots.range_minus_distance_m.iter());
     RangeCheck {
         profiles: profiles
             .iter()
@@ -608,7 +612,7 @@ fn ranges(profiles: &[Profile]) -> RangeCheck {
                     ..summary
                 },
                 range_minus_distance_crossover_m: summary,
-                decoding_m: Summary::of(&shots.decoding_m),
+                decoding_m: Summary::over(|| shots.decoding_m.iter()),
                 spacecraft_m: [summary; 3],
                 mean_without_outliers_m: -2.0,
                 decoding_without_outliers_m: 0.001,

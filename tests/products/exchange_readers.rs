@@ -121,7 +121,7 @@ fn lrolola2isis_reads_five_columns_after_one_line() {
         let fields: Vec<&str> = line.split(',').collect();
         let number = |column: usize| -> f64 { fields[column].parse().unwrap() };
         let shot = site.footprints.row(row);
-        assert_eq!(fields[0], site.utc[row].to_string());
+        assert_eq!(fields[0], site.utc.at(row).to_string());
         assert!((0.0..360.0).contains(&number(1)));
         close(number(1), shot.longitude_rad.to_degrees(), 1e-9); // degrees, printed to as many
         close(number(2), shot.latitude_rad.to_degrees(), 1e-9);

@@ -24,6 +24,7 @@ use areograph::{
     units::{RADIANS_PER_DEGREE, SECONDS_PER_DAY},
     utc::Utc,
 };
+use areograph_testing::replace;
 use arrow_array::RecordBatch;
 use arrow_array::cast::AsArray;
 use arrow_array::types::{Float64Type, UInt32Type};
@@ -488,7 +489,7 @@ fn an_empty_site_has_empty_products() {
 #[test]
 fn numbers_that_are_not_finite_are_refused_with_their_place() {
     let mut site = Site::small();
-    site.footprints.range_m[4] = f64::NAN;
+    replace(&mut site.footprints.range_m, 4, f64::NAN);
     let folder = tempfile::tempdir().unwrap();
     let failure = site
         .with(true, |site| {
@@ -518,7 +519,7 @@ fn numbers_that_are_not_finite_are_refused_with_their_place() {
 #[test]
 fn parts_that_do_not_belong_together_are_refused() {
     let mut site = Site::small();
-    site.utc.pop();
+    drop(site.utc.split_off(site.utc.len() - 1));
     let folder = tempfile::tempdir().unwrap();
     let failure = site
         .with(true, |site| {

@@ -245,15 +245,15 @@ fn moved_footprints_go_where_the_adjusted_image_has_them() {
             let near = |a: f64, b: f64| (a - b).abs() < 1e-3;
             let (old, new) = (&before.points, &after.points);
             let found = (0..old.len())
-                .find(|index| near(old.line[*index], x) && near(old.sample[*index], y))
+                .find(|index| near(old.line.at(*index), x) && near(old.sample.at(*index), y))
                 .unwrap();
             let shot = |points: &areograph::stages::register::RegisteredPoints, index: usize| {
-                (points.profile[index], points.row[index])
+                (points.profile.at(index), points.row.at(index))
             };
             let same = (0..new.len())
                 .find(|index| shot(new, *index) == shot(old, found))
                 .unwrap();
-            assert!(near(new.line[same], x + by_x) && near(new.sample[same], y + by_y));
+            assert!(near(new.line.at(same), x + by_x) && near(new.sample.at(same), y + by_y));
         }
     }
 }

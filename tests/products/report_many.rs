@@ -90,7 +90,8 @@ fn the_page_of_many_images_is_made_again_from_its_data() {
     });
     let hide = |index: usize, registration: &mut ImageRegistration| {
         if shown.contains(&index) {
-            registration.points.inside.fill(false);
+            let points = &mut registration.points;
+            points.inside = points.inside.changed(|_, _| false);
             for profile in &mut registration.profiles {
                 profile.inside = 0;
             }

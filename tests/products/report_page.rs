@@ -14,6 +14,7 @@ use crate::common::{
 use std::{collections::BTreeSet, fs, path::Path};
 
 use areograph::{capabilities, geom::statistics::Summary, stages::judge::CheckKind};
+use areograph_testing::replace;
 use fixture::{SHOTS, Site};
 
 /// The page, also left below `target`, where a person may look at it.
@@ -231,7 +232,11 @@ fn the_map_tells_heights_of_shots_that_it_does_not_draw() {
         site.footprints.push(&shot);
     }
     // 10060 shots: every third is drawn, the first, the fourth …
-    site.footprints.radius_crossover_m[1] += 4_000.0;
+    replace(
+        &mut site.footprints.radius_crossover_m,
+        1,
+        shot.radius_crossover_m + 4_000.0,
+    );
     let page = page("high", &site, false);
     assert!(page.contains(
         "10\u{202f}060 footprints (dots, profiles named by orbit), −1499 to 2501 m above the areoid."

@@ -30,6 +30,7 @@ use areograph::{
     time::Et,
     units::METRES_PER_KM,
 };
+use areograph_testing::replace;
 use images::{Image, kernel_camera};
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -276,9 +277,9 @@ fn image_to_ground_to_image_closes_where_the_exposure_changes() {
         let row = expected.len();
         if row < site.footprints.len() {
             let place = Spherical::from_xyz_m(&ground_m);
-            site.footprints.longitude_rad[row] = place.longitude_rad;
-            site.footprints.latitude_rad[row] = place.latitude.0;
-            site.footprints.radius_crossover_m[row] = place.radius_m;
+            replace(&mut site.footprints.longitude_rad, row, place.longitude_rad);
+            replace(&mut site.footprints.latitude_rad, row, place.latitude.0);
+            replace(&mut site.footprints.radius_crossover_m, row, place.radius_m);
             expected.push((line, sample));
         }
     }
@@ -300,8 +301,8 @@ fn image_to_ground_to_image_closes_where_the_exposure_changes() {
     .unwrap();
     assert_eq!(registered.points.len(), expected.len());
     for (index, (line, sample)) in expected.iter().enumerate() {
-        let lines = registered.points.line[index] - line;
-        let samples = registered.points.sample[index] - sample;
+        let lines = registered.points.line.at(index) - line;
+        let samples = registered.points.sample.at(index) - sample;
         // Positions from angles are rounded to 1e-9 m of lines of metres.
         assert!(
             lines.hypot(samples) < 1e-6,

@@ -19,6 +19,7 @@ use areograph::{
     },
     stages::register::{ImageRegistration, Method, register},
 };
+use areograph_testing::replace;
 use arrow_array::RecordBatch;
 use arrow_array::cast::AsArray;
 use arrow_array::types::{Float64Type, UInt32Type};
@@ -63,7 +64,7 @@ fn footprints_under_the_boresight_come_back_to_their_lines() {
             let line_offset = line_offset(row);
             let expected = line_offset + 0.5 * f64::from(site.times.line_times.lines());
             let extrapolated = line_offset.abs() > 768.0;
-            assert_eq!(found.points.extrapolated[row], extrapolated);
+            assert_eq!(found.points.extrapolated.at(row), extrapolated);
             // Lines: polynomials and samples agree on a bend of 1e-6 rad to a few centimetres of 50 m lines
             // within the image; beyond it the samples go on straight.
             let tolerance = if extrapolated { 0.5 } else { 0.01 };
@@ -71,16 +72,16 @@ fn footprints_under_the_boresight_come_back_to_their_lines() {
                 (line - expected).abs() < tolerance,
                 "{model:?}: {line} for {expected}"
             );
-            assert!(found.points.residual_px[row].abs() < 1e-6); // pixels
+            assert!(found.points.residual_px.at(row).abs() < 1e-6); // pixels
         }
         // Detector 1024 lies on the boresight: sample 128 of 256 that sum eight.
-        assert!((found.points.sample[20] - 128.0).abs() < 0.01);
+        assert!((found.points.sample.at(20) - 128.0).abs() < 0.01);
         // 1280 of 1536 lines were delivered.
         let inside = found
             .points
             .line
             .iter()
-            .filter(|line| (0.0..=1280.0).contains(*line));
+            .filter(|line| (0.0..=1280.0).contains(line));
         assert_eq!(found.points.inside_count(), inside.count());
     }
 }
@@ -111,7 +112,7 @@ fn iterations_are_counted_for_every_point_within_the_lines() {
         assert!(
             untried
                 .into_iter()
-                .all(|(count, beyond)| (*count == 0) == *beyond)
+                .all(|(count, beyond)| (count == 0) == beyond)
         );
     }
 }
@@ -120,10 +121,13 @@ fn iterations_are_counted_for_every_point_within_the_lines() {
 fn what_has_no_place_is_counted_by_reason() {
     let mut site = under_the_camera();
     // The other side of Mars, the sky, and no place at all.
-    site.footprints.longitude_rad[3] += std::f64::consts::PI;
-    site.footprints.latitude_rad[3] *= -1.0;
-    site.footprints.radius_crossover_m[4] = 4.5e6;
-    site.footprints.radius_crossover_m[5] = f64::NAN;
+    let of = &mut site.footprints;
+    let here = of.row(3);
+    let there_rad = here.longitude_rad + std::f64::consts::PI;
+    replace(&mut of.longitude_rad, 3, there_rad);
+    replace(&mut of.latitude_rad, 3, -here.latitude_rad);
+    replace(&mut of.radius_crossover_m, 4, 4.5e6);
+    replace(&mut of.radius_crossover_m, 5, f64::NAN);
     let found = registered(&site);
     assert_eq!(found.points.len(), SHOTS as usize - 3);
     let rejected: Vec<(&str, u64)> = found.rejected.iter().map(|(k, v)| (&**k, *v)).collect();
@@ -135,7 +139,7 @@ fn what_has_no_place_is_counted_by_reason() {
             ("not a finite number", 1)
         ]
     );
-    assert!(!found.points.row.iter().any(|row| (3..6).contains(row)));
+    assert!(!found.points.row.iter().any(|row| (3..6).contains(&row)));
     assert_eq!(found.profiles[0].points, SHOTS - 3);
 }
 
@@ -150,7 +154,7 @@ fn repeated_shots_and_empty_profiles_are_nothing_special() {
     assert_eq!(found.points.len(), SHOTS as usize + 1);
     assert_eq!(found.profiles[0].points, 0);
     assert_eq!(found.profiles[0].shot_spacing_lines, None);
-    let twice: Vec<f64> = (7..9).map(|index| found.points.line[index]).collect();
+    let twice: Vec<f64> = (7..9).map(|index| found.points.line.at(index)).collect();
     assert!(twice[0].to_bits() == twice[1].to_bits());
     site.profiles.clear();
     let none = registered(&site);

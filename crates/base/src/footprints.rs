@@ -33,6 +33,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     altimetry::GroundRadius,
     body::{Body, Datum},
+    column::Column,
 };
 
 /// State of footprint coordinates as in their files; each file states its datum.
@@ -125,7 +126,7 @@ macro_rules! columns {
             pub body: Body,
             /// Which radius represents the ground.
             pub ground: GroundRadius,
-            $($(#[$doc])* #[serde(with = "crate::packed")] pub $column: Vec<$kind>,)*
+            $($(#[$doc])* pub $column: Column<$kind>,)*
             datum: PhantomData<D>,
         }
 
@@ -139,7 +140,7 @@ macro_rules! columns {
             /// No footprints on `body` yet, from these files.
             #[must_use]
             pub const fn on(body: Body, files: Vec<SourceFile>) -> Self {
-                Self { files, body, ground: GroundRadius::Corrected, $($column: Vec::new(),)* datum: PhantomData }
+                Self { files, body, ground: GroundRadius::Corrected, $($column: Column::new(),)* datum: PhantomData }
             }
 
             /// Appends one shot.
@@ -173,7 +174,7 @@ macro_rules! columns {
             /// If the row does not exist.
             #[must_use]
             pub fn row(&self, row: usize) -> Footprint {
-                Footprint { $($column: self.$column[row],)* }
+                Footprint { $($column: self.$column.at(row),)* }
             }
 
             /// The columns, with coordinates declared to belong to `E`.
@@ -247,7 +248,7 @@ impl<D> Footprints<D> {
     /// If the row does not exist.
     #[must_use]
     pub fn topography_of_m(&self, row: usize) -> f64 {
-        self.radius_crossover_m[row] - self.areoid_radius_m[row]
+        self.radius_crossover_m.at(row) - self.areoid_radius_m.at(row)
     }
 
     /// Radius of the ground by the shot in row `row`, metres: the one that all stages use.
@@ -257,8 +258,8 @@ impl<D> Footprints<D> {
     #[must_use]
     pub fn ground_radius_m(&self, row: usize) -> f64 {
         match self.ground {
-            GroundRadius::Corrected => self.radius_crossover_m[row],
-            GroundRadius::Raw => self.radius_m[row],
+            GroundRadius::Corrected => self.radius_crossover_m.at(row),
+            GroundRadius::Raw => self.radius_m.at(row),
         }
     }
 

@@ -18,6 +18,7 @@ extern crate self as areograph_base;
 
 pub mod altimetry;
 pub mod body;
+pub mod column;
 pub mod constants;
 pub mod error;
 pub mod footprints;

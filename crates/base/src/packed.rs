@@ -4,11 +4,12 @@
 //! their size by a factor of 5 to 15. A field with `#[serde(with = "areograph_base::packed")]` is stored in the form that
 //! [`serialize`] produces.
 
-use std::fmt;
+use std::{borrow::Cow, fmt};
 
 use pco::{
     ChunkConfig,
     data_types::Number,
+    errors::PcoError,
     standalone::{simple_compress, simple_decompress},
 };
 use rayon::prelude::*;
@@ -22,7 +23,7 @@ const LEVEL: usize = 4;
 const LENGTH_BYTES: usize = 8;
 
 /// A type whose values can be stored in a packed column.
-pub trait Packed: Copy + Send + Sync {
+pub trait Packed: Copy + Default + Send + Sync + 'static {
     /// The number.
     type Number: Number + Send;
 
@@ -70,19 +71,44 @@ impl Packed for bool {
 /// # Errors
 /// Those of `serializer`.
 pub fn serialize<T: Packed, S: Serializer>(column: &[T], serializer: S) -> Result<S::Ok, S::Error> {
-    let pieces = column.par_chunks(PIECE).map(|values| {
-        let numbers: Vec<T::Number> = values.iter().map(|value| value.number()).collect();
-        let config = ChunkConfig::default().with_compression_level(LEVEL);
-        simple_compress(&numbers, &config.with_enable_8_bit(true))
-    });
-    let pieces: Result<Vec<Vec<u8>>, _> = pieces.collect();
-    let pieces = pieces.map_err(S::Error::custom)?;
-    let mut bytes = length(column.len()).to_vec();
-    for piece in pieces {
+    serialize_pieces(column.len(), std::iter::empty(), column, PIECE, serializer)
+}
+
+/// Stores `count` values: packed pieces, and behind them values that are packed in pieces of this size.
+///
+/// # Errors
+/// Those of `serializer`.
+pub(crate) fn serialize_pieces<'a, T: Packed, S: Serializer>(
+    count: usize,
+    pieces: impl Iterator<Item = Cow<'a, [u8]>>,
+    rest: &[T],
+    size: usize,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    let packed: Result<Vec<Vec<u8>>, _> = rest.par_chunks(size).map(piece).collect();
+    let packed = packed.map_err(S::Error::custom)?;
+    let mut bytes = length(count).to_vec();
+    for piece in pieces.chain(packed.into_iter().map(Cow::Owned)) {
         bytes.extend(length(piece.len()));
-        bytes.extend(piece);
+        bytes.extend(&*piece);
     }
     serializer.serialize_bytes(&bytes)
+}
+
+/// Packs the values of a piece.
+///
+/// # Errors
+/// None for the numbers of columns.
+pub(crate) fn piece<T: Packed>(values: &[T]) -> Result<Vec<u8>, PcoError> {
+    let numbers: Vec<T::Number> = values.iter().map(|value| value.number()).collect();
+    let config = ChunkConfig::default().with_compression_level(LEVEL);
+    simple_compress(&numbers, &config.with_enable_8_bit(true))
+}
+
+/// The values of a packed piece; `None` if it is damaged.
+pub(crate) fn values<T: Packed>(piece: &[u8]) -> Option<Vec<T>> {
+    let numbers: Vec<T::Number> = simple_decompress(piece).ok()?;
+    Some(numbers.into_iter().map(T::of).collect())
 }
 
 /// Reads a column that [`serialize`] stored.
@@ -93,8 +119,11 @@ pub fn deserialize<'de, T: Packed, D: Deserializer<'de>>(
     deserializer: D,
 ) -> Result<Vec<T>, D::Error> {
     let bytes = deserializer.deserialize_bytes(Bytes)?;
-    unpacked(&bytes).ok_or_else(|| de::Error::custom("a stored column is damaged"))
+    unpacked(&bytes).ok_or_else(|| de::Error::custom(DAMAGED))
 }
+
+/// The reason why a stored column is refused.
+pub(crate) const DAMAGED: &str = "a stored column is damaged";
 
 const fn length(count: usize) -> [u8; LENGTH_BYTES] {
     (count as u64).to_le_bytes()
@@ -106,7 +135,8 @@ fn split_length(bytes: &[u8]) -> Option<(usize, &[u8])> {
     Some((usize::try_from(u64::from_le_bytes(*length)).ok()?, rest))
 }
 
-fn unpacked<T: Packed>(bytes: &[u8]) -> Option<Vec<T>> {
+/// The number of values of a stored column, and its packed pieces.
+pub(crate) fn split(bytes: &[u8]) -> Option<(usize, Vec<&[u8]>)> {
     let (count, mut rest) = split_length(bytes)?;
     let mut pieces = Vec::new();
     while !rest.is_empty() {
@@ -115,20 +145,21 @@ fn unpacked<T: Packed>(bytes: &[u8]) -> Option<Vec<T>> {
         pieces.push(piece);
         rest = behind;
     }
-    let pieces = pieces.into_par_iter().map(|piece| {
-        let numbers: Vec<T::Number> = simple_decompress(piece).ok()?;
-        Some(numbers.into_iter().map(T::of).collect())
-    });
-    let pieces: Vec<Vec<T>> = pieces.collect::<Option<_>>()?;
+    Some((count, pieces))
+}
+
+fn unpacked<T: Packed>(bytes: &[u8]) -> Option<Vec<T>> {
+    let (count, pieces) = split(bytes)?;
+    let pieces: Vec<Vec<T>> = pieces.into_par_iter().map(values).collect::<Option<_>>()?;
     let values = pieces.concat();
     (values.len() == count).then_some(values)
 }
 
 /// Visitor of bytes; borrows them from a stored output instead of copying them.
-struct Bytes;
+pub(crate) struct Bytes;
 
 impl<'de> de::Visitor<'de> for Bytes {
-    type Value = std::borrow::Cow<'de, [u8]>;
+    type Value = Cow<'de, [u8]>;
 
     fn expecting(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
         to.write_str("the bytes of a column")

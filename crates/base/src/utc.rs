@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::packed::Packed;
 
 /// An instant of UTC, microseconds since 1970 without leap seconds; a leap second maps to the following second.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Utc(i64);
 

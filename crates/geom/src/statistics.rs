@@ -11,6 +11,9 @@ pub const NORMAL_MAD: f64 = 1.4826;
 /// profile may agree exactly.
 const SPREAD_FLOOR_M: f64 = 0.01;
 
+/// Number of values that a summary holds.
+const HELD_MAX: usize = 1 << 17;
+
 /// Minimum number of residuals for the correlation of neighbours.
 const CORRELATED_MIN: usize = 10;
 
@@ -79,6 +82,30 @@ impl Summary {
         }
     }
 
+    /// Statistics of the values of an iterator, which is called several times instead of holding many values: the same
+    /// as [`Summary::of`] bit for bit.
+    #[must_use]
+    pub fn over<I: Iterator<Item = f64>>(values: impl Fn() -> I) -> Self {
+        let count = values().count();
+        if count <= HELD_MAX {
+            return Self::of(&values().collect::<Vec<_>>());
+        }
+        let n = count as f64;
+        let mean = values().sum::<f64>() / n;
+        let squares: f64 = values().map(|value| (value - mean).powi(2)).sum();
+        let median = median_over(count, &values);
+        let deviations = || values().map(|value| (value - median).abs());
+        Self {
+            n: u32::try_from(count).unwrap_or(u32::MAX),
+            mean,
+            standard_deviation: (squares / (n - 1.0).max(1.0)).sqrt(),
+            median,
+            nmad: NORMAL_MAD * median_over(count, &deviations),
+            min: values().fold(f64::INFINITY, f64::min),
+            max: values().fold(f64::NEG_INFINITY, f64::max),
+        }
+    }
+
     /// Largest distance from the median within which a value in metres is not an outlier, for `sigma` robust standard
     /// deviations.
     ///
@@ -135,6 +162,50 @@ pub fn median(values: &mut [f64]) -> f64 {
         Some(lower) if values.len().is_multiple_of(2) => 0.5 * (lower + upper),
         _ => upper,
     }
+}
+
+/// The median of at least one value, as [`median`].
+fn median_over<I: Iterator<Item = f64>>(count: usize, values: &impl Fn() -> I) -> f64 {
+    let upper = ranked(count / 2, values);
+    if count.is_multiple_of(2) {
+        0.5 * (ranked(count / 2 - 1, values) + upper)
+    } else {
+        upper
+    }
+}
+
+/// The value of this rank, counted from 0, among more values: its bits are found sixteen at a time.
+fn ranked<I: Iterator<Item = f64>>(mut rank: usize, values: &impl Fn() -> I) -> f64 {
+    const DIGIT_BITS: u32 = 16;
+    const SIGN: u64 = 1 << 63;
+    // Bits in the order of `f64::total_cmp`.
+    let ordered = |value: f64| {
+        let bits = value.to_bits();
+        if bits & SIGN == 0 { bits | SIGN } else { !bits }
+    };
+    let mut found: u64 = 0;
+    for shift in (0..64).step_by(DIGIT_BITS as usize).rev() {
+        let mut counts = vec![0_usize; 1 << DIGIT_BITS];
+        // All higher bits are known; at first there are none.
+        let above = |bits: u64| bits.checked_shr(shift + DIGIT_BITS).unwrap_or_default();
+        for bits in values()
+            .map(ordered)
+            .filter(|bits| above(*bits) == above(found))
+        {
+            counts[(bits >> shift) as usize % (1 << DIGIT_BITS)] += 1;
+        }
+        let mut digit = 0;
+        while digit + 1 < counts.len() && rank >= counts[digit] {
+            rank -= counts[digit];
+            digit += 1;
+        }
+        found |= (digit as u64) << shift;
+    }
+    f64::from_bits(if found & SIGN == 0 {
+        !found
+    } else {
+        found ^ SIGN
+    })
 }
 
 /// Median and normalised median absolute deviation of at least one value.
@@ -265,6 +336,25 @@ mod tests {
 
     fn close(value: f64, expected: f64) {
         assert!((value - expected).abs() < 1e-12, "{value} {expected}"); // rounding of small numbers
+    }
+
+    #[test]
+    fn a_summary_over_many_values_is_that_of_a_list_bit_for_bit() {
+        let values = |count: usize| {
+            // Of both signs, with repetitions, and not in order.
+            (0..count).map(|index| ((index * 7_919) % 100_003) as f64 / 64.0 - 500.0)
+        };
+        for count in [0, 1, 2, HELD_MAX, HELD_MAX + 1, HELD_MAX + 2, 3 * HELD_MAX] {
+            let list: Vec<f64> = values(count).collect();
+            assert_eq!(
+                Summary::over(|| values(count)),
+                Summary::of(&list),
+                "{count}"
+            );
+        }
+        let equal = || std::iter::repeat_n(-0.25, 2 * HELD_MAX);
+        let list: Vec<f64> = equal().collect();
+        assert_eq!(Summary::over(equal), Summary::of(&list));
     }
 
     #[test]

@@ -33,21 +33,24 @@ const POLAR_DEG: f64 = 60.0;
 ///
 /// `west > east` when the shortest box crosses the antimeridian, as RFC 7946 (5.2) and GeoParquet state. Points
 /// that surround a pole have all longitudes and reach to the pole (5.3).
-pub(super) fn bounding_box_deg(points: &[[f64; 2]]) -> Option<[f64; 4]> {
-    let mut longitudes: Vec<f64> = points.iter().map(|point| point[0]).collect();
-    longitudes.sort_by(f64::total_cmp);
-    let (first, last) = (*longitudes.first()?, *longitudes.last()?);
-    // The box leaves out the widest empty stretch of longitudes; the one over the antimeridian unless
-    // another is wider.
-    let mut widest = first + 360.0 - last;
-    let (mut west, mut east) = (first, last);
-    for pair in longitudes.windows(2) {
-        if pair[1] - pair[0] > widest {
-            widest = pair[1] - pair[0];
-            (west, east) = (pair[1], pair[0]);
-        }
-    }
-    let latitudes = || points.iter().map(|point| point[1]);
+pub(super) fn bounding_box_deg(points: impl Iterator<Item = [f64; 2]> + Clone) -> Option<[f64; 4]> {
+    let longitudes = || points.clone().map(|point| point[0]);
+    let stretch = widest_stretch(ends_of_cells(longitudes()))?;
+    // A stretch as wide as a cell does not lie in one.
+    let [west, east] = if stretch[2] >= CELL_DEG {
+        [stretch[0], stretch[1]]
+    } else {
+        let mut each: Vec<f64> = longitudes().collect();
+        each.sort_by(f64::total_cmp);
+        let [west, east, _] = widest_stretch(each.into_iter())?;
+        [west, east]
+    };
+    let widest = if west > east {
+        west - east
+    } else {
+        west + 360.0 - east
+    };
+    let latitudes = || points.clone().map(|point| point[1]);
     let south = latitudes().fold(f64::INFINITY, f64::min);
     let north = latitudes().fold(f64::NEG_INFINITY, f64::max);
     let surrounded = widest < 180.0;
@@ -57,6 +60,42 @@ pub(super) fn bounding_box_deg(points: &[[f64; 2]]) -> Option<[f64; 4]> {
         [-180.0, -90.0, 180.0, north]
     } else {
         [west, south, east, north]
+    })
+}
+
+/// Width of a cell of longitudes, degrees.
+const CELL_DEG: f64 = 360.0 / CELLS as f64;
+/// Number of cells around the planet.
+const CELLS: usize = 1 << 16;
+
+/// The smallest and the largest longitude in each cell, in ascending order.
+fn ends_of_cells(longitudes: impl Iterator<Item = f64>) -> impl Iterator<Item = f64> {
+    let mut cells = vec![[f64::INFINITY, f64::NEG_INFINITY]; CELLS];
+    for east_deg in longitudes {
+        let cell = ((east_deg + 180.0) / CELL_DEG) as usize;
+        let ends = &mut cells[cell.min(CELLS - 1)];
+        *ends = [ends[0].min(east_deg), ends[1].max(east_deg)];
+    }
+    let full = cells.into_iter().filter(|ends| ends[0] <= ends[1]);
+    full.flatten()
+}
+
+/// West and east of the box that leaves out the widest empty stretch of ascending longitudes, and the width of the
+/// stretch; the stretch over the antimeridian unless another is wider. `None` without a longitude.
+fn widest_stretch(mut longitudes: impl Iterator<Item = f64>) -> Option<[f64; 3]> {
+    let first = longitudes.next()?;
+    let (mut last, mut inner) = (first, [first, first, 0.0]);
+    for east_deg in longitudes {
+        if east_deg - last > inner[2] {
+            inner = [east_deg, last, east_deg - last];
+        }
+        last = east_deg;
+    }
+    let outer = first + 360.0 - last;
+    Some(if inner[2] > outer {
+        inner
+    } else {
+        [first, last, outer]
     })
 }
 
@@ -75,23 +114,48 @@ mod tests {
     #[test]
     fn boxes_cross_the_antimeridian_when_that_is_shorter() {
         let across = [[179.5, 1.0], [-179.0, 3.0], [179.9, 2.0]];
-        assert_eq!(bounding_box_deg(&across), Some([179.5, 1.0, -179.0, 3.0]));
+        assert_eq!(
+            bounding_box_deg(across.into_iter()),
+            Some([179.5, 1.0, -179.0, 3.0])
+        );
         let greenwich = [[-1.0, -5.0], [2.0, -6.0]];
-        assert_eq!(bounding_box_deg(&greenwich), Some([-1.0, -6.0, 2.0, -5.0]));
-        assert_eq!(bounding_box_deg(&[]), None);
+        assert_eq!(
+            bounding_box_deg(greenwich.into_iter()),
+            Some([-1.0, -6.0, 2.0, -5.0])
+        );
+        assert_eq!(bounding_box_deg(std::iter::empty()), None);
+    }
+
+    #[test]
+    fn cells_of_longitudes_give_the_widest_stretch_of_sorted_ones() {
+        // Multiples of an irrational angle: dense ones have no stretch as wide as a cell.
+        for (count, part_deg) in [(1, 360.0), (7, 360.0), (1_000, 200.0), (200_000, 360.0)] {
+            let longitudes = (1..=count).map(|index| {
+                let turns = f64::from(index) * 0.618_033_988_749_894_9;
+                turns.fract() * part_deg - 180.0
+            });
+            let mut sorted: Vec<f64> = longitudes.clone().collect();
+            sorted.sort_by(f64::total_cmp);
+            let expected = widest_stretch(sorted.into_iter()).unwrap();
+            let found = bounding_box_deg(longitudes.map(|east| [east, 0.0])).unwrap();
+            assert_eq!([found[0], found[2]], [expected[0], expected[1]], "{count}");
+        }
     }
 
     #[test]
     fn boxes_round_a_pole_reach_it() {
         let round = |latitude: f64| [-170.0, -50.0, 60.0, 160.0].map(|east| [east, latitude]);
         let north = Some([-180.0, 86.0, 180.0, 90.0]);
-        assert_eq!(bounding_box_deg(&round(86.0)), north);
+        assert_eq!(bounding_box_deg(round(86.0).into_iter()), north);
         let south = Some([-180.0, -90.0, 180.0, -86.0]);
-        assert_eq!(bounding_box_deg(&round(-86.0)), south);
+        assert_eq!(bounding_box_deg(round(-86.0).into_iter()), south);
         // A track that passes beside the pole, and a belt.
         let track = [[10.0, 88.0], [100.0, 89.0], [180.0, 87.0]];
-        assert_eq!(bounding_box_deg(&track), Some([10.0, 87.0, 180.0, 89.0]));
+        assert_eq!(
+            bounding_box_deg(track.into_iter()),
+            Some([10.0, 87.0, 180.0, 89.0])
+        );
         let belt = Some([-50.0, 5.0, -170.0, 5.0]);
-        assert_eq!(bounding_box_deg(&round(5.0)), belt);
+        assert_eq!(bounding_box_deg(round(5.0).into_iter()), belt);
     }
 }

@@ -19,7 +19,10 @@ use super::{
     table::{Meaning, Table, meanings},
     text_table,
 };
-use areograph_base::{footprints::Footprints, frames::BodyFixed, schema::DocumentSchema, utc::Utc};
+use areograph_base::{
+    column::Column, footprints::Footprints, frames::BodyFixed, packed::Packed,
+    schema::DocumentSchema, utc::Utc,
+};
 use areograph_config::ShotFormat;
 use areograph_geom::ellipsoid::{AreocentricLatitude, spherical_to_xyz_m};
 
@@ -57,7 +60,7 @@ pub(super) static PARQUET: Declaration = Declaration {
     role: Role::Data,
     content: Content::Table(|| meanings(&columns())),
     write: Write::Site(|path, of| {
-        let bounds = bounding_box_deg(&points_deg(of.site));
+        let bounds = bounding_box_deg(points_deg(of.site));
         let mut metadata = vec![
             (
                 "geo",
@@ -114,14 +117,14 @@ pub(super) trait ShotNames: Sync {
 
 impl ShotNames for SiteProducts<'_> {
     fn write_windows(&self, row: usize, out: &mut dyn fmt::Write) -> fmt::Result {
-        let mask = self.footprints.windows[row];
+        let mask = self.footprints.windows.at(row);
         let windows = self.config.windows.iter().enumerate();
         let held = windows.filter(|(bit, _)| mask >> bit & 1 == 1);
         write_list(held.map(|(_, window)| window.id.as_str()), out)
     }
 
     fn utc(&self, row: usize) -> Utc {
-        self.utc[row]
+        self.utc.at(row)
     }
 }
 
@@ -141,8 +144,10 @@ pub(super) fn write_list<'a>(
 
 impl<'a> Shot<'a> {
     fn new(footprints: &'a Footprints<BodyFixed>, names: &'a dyn ShotNames, row: usize) -> Self {
-        let (longitude_rad, latitude_rad) =
-            (footprints.longitude_rad[row], footprints.latitude_rad[row]);
+        let (longitude_rad, latitude_rad) = (
+            footprints.longitude_rad.at(row),
+            footprints.latitude_rad.at(row),
+        );
         let radius_m = footprints.ground_radius_m(row);
         Self {
             footprints,
@@ -174,8 +179,8 @@ impl<'a> Shot<'a> {
     }
 
     /// The column of footprints that `of` picks, in the shot's row.
-    pub(super) fn get<T: Copy>(&self, of: fn(&Footprints<BodyFixed>) -> &Vec<T>) -> T {
-        of(self.footprints)[self.row]
+    pub(super) fn get<T: Packed>(&self, of: fn(&Footprints<BodyFixed>) -> &Column<T>) -> T {
+        of(self.footprints).at(self.row)
     }
 
     pub(super) fn utc(&self) -> Utc {
@@ -200,8 +205,8 @@ impl<'a> Shot<'a> {
 /// Longitude (-180..180) and latitude of the footprint in this row, degrees.
 pub(super) fn point_deg(footprints: &Footprints<BodyFixed>, row: usize) -> [f64; 2] {
     [
-        signed_longitude_deg(footprints.longitude_rad[row]),
-        degrees(footprints.latitude_rad[row]),
+        signed_longitude_deg(footprints.longitude_rad.at(row)),
+        degrees(footprints.latitude_rad.at(row)),
     ]
 }
 
@@ -216,7 +221,7 @@ pub(super) fn features<'a>(site: &'a SiteProducts<'a>) -> Features<'a> {
     let body = site.config.body;
     let point = |row: usize| {
         let [east_deg, north_deg] = point_deg(site.footprints, row);
-        let height_m = site.footprints.radius_crossover_m[row] - body.map().radius_m;
+        let height_m = site.footprints.radius_crossover_m.at(row) - body.map().radius_m;
         [east_deg, north_deg, height_m]
     };
     let rows = 0..site.footprints.len();
@@ -251,7 +256,9 @@ pub(super) fn schema() -> DocumentSchema {
 }
 
 /// Longitude (-180..180) and latitude of every footprint, degrees.
-pub(super) fn points_deg(site: &SiteProducts) -> Vec<[f64; 2]> {
+pub(super) fn points_deg<'a>(
+    site: &'a SiteProducts<'a>,
+) -> impl Iterator<Item = [f64; 2]> + Clone + 'a {
     let rows = 0..site.footprints.len();
-    rows.map(|row| point_deg(site.footprints, row)).collect()
+    rows.map(|row| point_deg(site.footprints, row))
 }

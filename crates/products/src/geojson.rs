@@ -269,7 +269,7 @@ fn write_lines(path: &Path, head: &str, features: &Features) -> Result<()> {
 }
 
 fn head(features: &Features) -> std::result::Result<String, ProductError> {
-    let bounds_deg = bounding_box_deg(&features.points_deg());
+    let bounds_deg = bounding_box_deg(features.points_deg().into_iter());
     head_of(features.name, features.body, features.frame, bounds_deg)
 }
 

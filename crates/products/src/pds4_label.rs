@@ -192,7 +192,7 @@ fn identification(site: &SiteProducts) -> String {
 
 /// Time, instrument and target of the shots.
 fn observation(site: &SiteProducts) -> String {
-    let utc = |shot: Option<&Utc>| shot.map_or(String::new(), |utc| format!("{utc}Z"));
+    let utc = |shot: Option<Utc>| shot.map_or(String::new(), |utc| format!("{utc}Z"));
     let mission = if site.config.shots.is_empty() {
         SPACECRAFT.full_name.clone()
     } else {

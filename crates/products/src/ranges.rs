@@ -1,6 +1,6 @@
 //! The range check: residuals per shot as Parquet, statistics and verdicts as JSON.
 
-use std::{borrow::Cow, collections::HashSet};
+use std::borrow::Cow;
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -13,8 +13,8 @@ use super::{
     table::{Column, Table, Unit, column, meanings},
 };
 use areograph_base::{
-    altimetry::MolaClock, body::Body, footprints::Footprints, frames::BodyFixed,
-    schema::DocumentSchema, season::solar_longitude_rad,
+    altimetry::MolaClock, body::Body, column::Column as Values, footprints::Footprints,
+    frames::BodyFixed, packed::Packed, schema::DocumentSchema, season::solar_longitude_rad,
 };
 use areograph_config::RangeCheckConfig;
 use areograph_geom::{
@@ -65,14 +65,11 @@ const DEFINITIONS: [(&str, &str); 7] = [
     ),
 ];
 
-/// Positions at which rows of footprints occur first.
-fn each_once(rows: &[u32]) -> Vec<usize> {
-    let mut seen = HashSet::with_capacity(rows.len());
-    let places = rows.iter().enumerate();
-    places
-        .filter(|(_, row)| seen.insert(**row))
-        .map(|(place, _)| place)
-        .collect()
+/// Whether each of `rows` of so many footprints occurs there first.
+fn each_once(rows: &Values<u32>, footprints: usize) -> Vec<bool> {
+    let mut seen = vec![false; footprints];
+    let is_first = |row: u32| !std::mem::replace(&mut seen[row as usize], true);
+    rows.iter().map(is_first).collect()
 }
 
 #[derive(Serialize, JsonSchema)]
@@ -216,16 +213,16 @@ struct RangedShot<'a> {
 
 impl RangedShot<'_> {
     fn row(&self) -> u32 {
-        self.site.ranges.shots.row[self.at]
+        self.site.ranges.shots.row.at(self.at)
     }
 
     /// The value of this shot in the footprint column that `of` selects.
-    fn footprint<T: Copy>(&self, of: fn(&Footprints<BodyFixed>) -> &Vec<T>) -> T {
-        of(self.site.footprints)[self.row() as usize]
+    fn footprint<T: Packed>(&self, of: fn(&Footprints<BodyFixed>) -> &Values<T>) -> T {
+        of(self.site.footprints).at(self.row() as usize)
     }
 
     fn profile(&self) -> String {
-        let index = self.site.ranges.shots.profile[self.at];
+        let index = self.site.ranges.shots.profile.at(self.at);
         let profile = self.site.profiles.get(index as usize);
         profile.map_or_else(String::new, |profile| profile.id.clone())
     }
@@ -235,20 +232,20 @@ fn columns<'a>() -> Vec<Column<RangedShot<'a>>> {
     fn residual<'a>(
         name: &'static str,
         description: &'static str,
-        of: fn(&ShotResiduals) -> &Vec<f64>,
+        of: fn(&ShotResiduals) -> &Values<f64>,
     ) -> Column<RangedShot<'a>> {
         column(name, Unit::Metre, description, move |shot: &RangedShot| {
-            of(&shot.site.ranges.shots)[shot.at]
+            of(&shot.site.ranges.shots).at(shot.at)
         })
     }
     /// A column whose values exist where the file has a spacecraft.
     fn own<'a>(
         name: &'static str,
         description: &'static str,
-        of: fn(&ShotResiduals) -> &Vec<f64>,
+        of: fn(&ShotResiduals) -> &Values<f64>,
     ) -> Column<RangedShot<'a>> {
         column(name, Unit::Metre, description, move |shot: &RangedShot| {
-            Some(of(&shot.site.ranges.shots)[shot.at]).filter(|of| !of.is_nan())
+            Some(of(&shot.site.ranges.shots).at(shot.at)).filter(|of| !of.is_nan())
         })
     }
     let definition = |index: usize| DEFINITIONS[index].1;
@@ -294,7 +291,7 @@ fn columns<'a>() -> Vec<Column<RangedShot<'a>>> {
             "outlier",
             Unit::None,
             "whether range_minus_distance_m is an outlier of its profile",
-            |shot: &RangedShot| shot.site.ranges.shots.outlier[shot.at],
+            |shot: &RangedShot| shot.site.ranges.shots.outlier.at(shot.at),
         ),
     ]
 }
@@ -305,12 +302,15 @@ pub(super) fn schema() -> DocumentSchema {
 }
 
 fn document<'a>(site: &SiteProducts<'a>) -> Document<'a> {
-    let once = each_once(&site.ranges.shots.row);
-    let residuals = once
-        .iter()
-        .map(|shot| site.ranges.shots.range_minus_distance_m[*shot]);
-    let residuals_m: Vec<f64> = residuals.collect();
     let ranges = site.ranges;
+    let once = each_once(&ranges.shots.row, site.footprints.len());
+    // Shots of several windows repeat.
+    let counted = || {
+        (0..ranges.shots.len())
+            .zip(&once)
+            .filter(|(_, once)| **once)
+    };
+    let residual_m = |(shot, _)| ranges.shots.range_minus_distance_m.at(shot);
     let valid = |profile: &&ProfileRanges| profile.invalid_because.is_empty();
     Document {
         format: "areograph ranges 1",
@@ -334,12 +334,11 @@ fn document<'a>(site: &SiteProducts<'a>) -> Document<'a> {
         summary: SiteSummary {
             profiles: site.profiles.len(),
             profiles_valid: ranges.profiles.iter().filter(valid).count(),
-            shots: once.len(),
-            outliers: once
-                .iter()
-                .filter(|shot| ranges.shots.outlier[**shot])
+            shots: counted().count(),
+            outliers: counted()
+                .filter(|(shot, _)| ranges.shots.outlier.at(*shot))
                 .count() as u64,
-            range_minus_distance_m: Summary::of(&residuals_m),
+            range_minus_distance_m: Summary::over(|| counted().map(residual_m)),
         },
         profiles: site
             .profiles

@@ -45,7 +45,7 @@ pub(super) static PARQUET: Declaration = Declaration {
             let rows = rows(of.site);
             let points: Vec<[f64; 2]> = rows.iter().map(Row::point_deg).collect();
             let body = of.site.config.body;
-            let bounds = bounding_box_deg(&points);
+            let bounds = bounding_box_deg(points.iter().copied());
             let metadata = vec![
                 ("geo", geo_metadata(body, bounds, None).to_string()),
                 ("frame", frame(body).to_owned()),
@@ -135,12 +135,12 @@ struct Place {
 impl Place {
     fn of(points: &RegisteredPoints, at: usize) -> Self {
         Self {
-            line: points.line[at],
-            sample: points.sample[at],
-            isis_line: registration::isis(points.isis_line[at]),
-            isis_sample: registration::isis(points.isis_sample[at]),
-            inside: points.inside[at],
-            extrapolated: points.extrapolated[at],
+            line: points.line.at(at),
+            sample: points.sample.at(at),
+            isis_line: registration::isis(points.isis_line.at(at)),
+            isis_sample: registration::isis(points.isis_sample.at(at)),
+            inside: points.inside.at(at),
+            extrapolated: points.extrapolated.at(at),
         }
     }
 }
@@ -149,8 +149,8 @@ impl Row<'_> {
     fn point_deg(&self) -> [f64; 2] {
         let footprints = self.site.footprints;
         [
-            signed_longitude_deg(footprints.longitude_rad[self.footprint]),
-            degrees(footprints.latitude_rad[self.footprint]),
+            signed_longitude_deg(footprints.longitude_rad.at(self.footprint)),
+            degrees(footprints.latitude_rad.at(self.footprint)),
         ]
     }
 
@@ -205,14 +205,14 @@ fn places(
     let mut places: BTreeMap<usize, (usize, [Option<Place>; 2])> = BTreeMap::new();
     // Only rows with a point inside an image are needed, and these are few.
     for points in rounds.into_iter().flatten() {
-        let inside = (0..points.len()).filter(|at| points.inside[*at]);
-        places.extend(inside.map(|at| (points.row[at] as usize, (usize::MAX, [None; 2]))));
+        let inside = (0..points.len()).filter(|at| points.inside.at(*at));
+        places.extend(inside.map(|at| (points.row.at(at) as usize, (usize::MAX, [None; 2]))));
     }
     for (round, points) in rounds.into_iter().enumerate() {
         let Some(points) = points else { continue };
         for at in 0..points.len() {
-            if let Some((profile, of_rounds)) = places.get_mut(&(points.row[at] as usize)) {
-                *profile = (*profile).min(points.profile[at] as usize);
+            if let Some((profile, of_rounds)) = places.get_mut(&(points.row.at(at) as usize)) {
+                *profile = (*profile).min(points.profile.at(at) as usize);
                 of_rounds[round].get_or_insert(Place::of(points, at));
             }
         }
@@ -285,16 +285,16 @@ fn shot<'a>() -> Vec<Column<Row<'a>>> {
             "orbit",
             Unit::None,
             "orbit number of the frame",
-            |row: &Row| row.site.footprints.orbit[row.footprint],
+            |row: &Row| row.site.footprints.orbit.at(row.footprint),
         ),
         column("record", Unit::None, "{record}", |row: &Row| {
-            row.site.footprints.record[row.footprint]
+            row.site.footprints.record.at(row.footprint)
         }),
         column(
             "shot",
             Unit::None,
             "number of the shot in its frame, 1 to 20",
-            |row: &Row| u32::from(row.site.footprints.shot[row.footprint]),
+            |row: &Row| u32::from(row.site.footprints.shot.at(row.footprint)),
         )
         .between(1, 20),
         column(
@@ -304,13 +304,13 @@ fn shot<'a>() -> Vec<Column<Row<'a>>> {
             |row: &Row| u32::try_from(row.footprint).unwrap_or(u32::MAX),
         ),
         column("utc", Unit::None, "time et_s in UTC", |row: &Row| {
-            row.site.utc[row.footprint]
+            row.site.utc.at(row.footprint)
         }),
         column(
             "et_s",
             Unit::Second,
             "time of the shot after the {altimeter} clock correction, TDB seconds past J2000",
-            |row: &Row| row.site.footprints.et_s[row.footprint],
+            |row: &Row| row.site.footprints.et_s.at(row.footprint),
         ),
     ]
 }
@@ -322,13 +322,13 @@ fn ground<'a>() -> Vec<Column<Row<'a>>> {
             "longitude_deg",
             Unit::Degree,
             "east longitude, 0..360 degrees, {frame}",
-            |row: &Row| degrees(row.site.footprints.longitude_rad[row.footprint]),
+            |row: &Row| degrees(row.site.footprints.longitude_rad.at(row.footprint)),
         ),
         column(
             "latitude_deg",
             Unit::Degree,
             "{latitude} latitude, degrees, {frame}",
-            |row: &Row| degrees(row.site.footprints.latitude_rad[row.footprint]),
+            |row: &Row| degrees(row.site.footprints.latitude_rad.at(row.footprint)),
         ),
         column(
             "ground_radius_m",

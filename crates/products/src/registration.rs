@@ -12,7 +12,9 @@ use super::{
     site::{ImageProducts, SiteProducts},
     table::{Column, Table, Unit, column, meanings},
 };
-use areograph_base::{altimetry::GroundRadius, schema::DocumentSchema};
+use areograph_base::{
+    altimetry::GroundRadius, column::Column as Values, packed::Packed, schema::DocumentSchema,
+};
 use areograph_config::RegistrationConfig;
 use areograph_geom::{pushbroom::CameraModel, statistics::Summary};
 use areograph_stages::{
@@ -193,8 +195,8 @@ struct Registered<'a> {
 
 impl Registered<'_> {
     /// The column that `of` picks, in the footprint's row.
-    fn get<T: Copy>(&self, of: fn(&RegisteredPoints) -> &Vec<T>) -> T {
-        of(&self.image.registration.points)[self.at]
+    fn get<T: Packed>(&self, of: fn(&RegisteredPoints) -> &Values<T>) -> T {
+        of(&self.image.registration.points).at(self.at)
     }
 
     fn profile(&self) -> String {
@@ -206,11 +208,19 @@ impl Registered<'_> {
 
 /// The footprints in `images`.
 fn table<'a>(site: &'a SiteProducts<'a>, images: &'a [ImageProducts<'a>]) -> Table<'a> {
-    let of_image = |image: &'a ImageProducts<'a>| {
-        let points = 0..image.registration.points.len();
-        points.map(move |at| Registered { site, image, at })
+    let ends = images.iter().scan(0, |end, image| {
+        *end += image.registration.points.len();
+        Some(*end)
+    });
+    let ends: Vec<usize> = ends.collect();
+    let count = ends.last().copied().unwrap_or_default();
+    let point = move |row| {
+        let of = ends.partition_point(|end| *end <= row);
+        let before = of.checked_sub(1).map_or(0, |before| ends[before]);
+        let (image, at) = (&images[of], row - before);
+        Registered { site, image, at }
     };
-    Table::new(columns(), images.iter().flat_map(of_image).collect()).in_terms(&site.config.terms())
+    Table::of(columns(), count, point).in_terms(&site.config.terms())
 }
 
 fn columns<'a>() -> Vec<Column<Registered<'a>>> {
@@ -369,7 +379,7 @@ fn document<'a>(site: &SiteProducts<'a>) -> Document<'a> {
 fn image_document<'a>(image: &ImageProducts<'a>, profiles: &'a [Profile]) -> ImageDocument<'a> {
     let registration = image.registration;
     let points = &registration.points;
-    let evaluations: Vec<f64> = points.evaluations.iter().map(|n| f64::from(*n)).collect();
+    let evaluations = || points.evaluations.iter().map(f64::from);
     let profile = |(profile, on_image): (&'a Profile, &ProfileOnImage)| ProfileDocument {
         id: &profile.id,
         points: on_image.points,
@@ -382,10 +392,10 @@ fn image_document<'a>(image: &ImageProducts<'a>, profiles: &'a [Profile]) -> Ima
         light_time: &image.orientation.light_time,
         points: points.len(),
         inside: points.inside_count(),
-        extrapolated: points.extrapolated.iter().filter(|beyond| **beyond).count(),
+        extrapolated: points.extrapolated.iter().filter(|beyond| *beyond).count(),
         rejected: &registration.rejected,
-        evaluations_newton: Summary::of(&evaluations),
-        residual_px: Summary::of(&points.residual_px),
+        evaluations_newton: Summary::over(evaluations),
+        residual_px: Summary::over(|| points.residual_px.iter()),
         profiles: profiles
             .iter()
             .zip(&registration.profiles)

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::ProductError;
 use areograph_base::{
+    column::Column,
     constants::{SPACECRAFT, Spacecraft},
     error::Result,
     footprints::Footprints,
@@ -60,7 +61,7 @@ pub struct SiteProducts<'a> {
     /// Footprints in IAU 2000.
     pub footprints: &'a Footprints<BodyFixed>,
     /// UTC of every footprint's corrected time.
-    pub utc: &'a [Utc],
+    pub utc: &'a Column<Utc>,
     /// Profiles in order.
     pub profiles: &'a [Profile],
     /// The profiles against each other.
@@ -179,7 +180,7 @@ impl<'a> SiteProducts<'a> {
     /// UTC of the latest shot as text, without shots of the first image, for formats that require a date: a clock would
     /// give different bytes each time.
     pub(super) fn newest_utc(&self) -> String {
-        let newest = self.utc.iter().max().map(Utc::to_string);
+        let newest = self.utc.iter().max().map(|utc| utc.to_string());
         let first = || Some(self.images.first()?.times.utc_start.clone());
         newest.or_else(first).unwrap_or_default()
     }

@@ -208,8 +208,11 @@ fn ranges(site: &SiteProducts, adjusted: &Adjusted) -> Markup {
 fn checked_ranges(site: &SiteProducts) -> BTreeMap<(usize, usize), f64> {
     let shots = &site.ranges.shots;
     let of_shot = |index: usize| {
-        let shot = (shots.profile[index] as usize, shots.row[index] as usize);
-        (shot, shots.range_minus_distance_m[index])
+        let shot = (
+            shots.profile.at(index) as usize,
+            shots.row.at(index) as usize,
+        );
+        (shot, shots.range_minus_distance_m.at(index))
     };
     (0..shots.len()).map(of_shot).collect()
 }

@@ -84,17 +84,19 @@ fn strip<'a>(site: &SiteProducts<'a>, overlays: &'a Overlays, image: usize) -> O
 
 impl Shown {
     fn of(site: &SiteProducts, points: &RegisteredPoints) -> Self {
-        let inside: Vec<usize> = (0..points.len()).filter(|at| points.inside[*at]).collect();
-        let height_m = |at: usize| site.footprints.topography_of_m(points.row[at] as usize);
+        let inside: Vec<usize> = (0..points.len())
+            .filter(|at| points.inside.at(*at))
+            .collect();
+        let height_m = |at: usize| site.footprints.topography_of_m(points.row.at(at) as usize);
         let drawn = thinned(&inside, DOTS);
         Self {
             places: drawn
                 .iter()
-                .map(|at| (points.line[*at], points.sample[*at]))
+                .map(|at| (points.line.at(*at), points.sample.at(*at)))
                 .collect(),
             heights_m: drawn
                 .iter()
-                .map(|at| (points.line[*at], height_m(*at)))
+                .map(|at| (points.line.at(*at), height_m(*at)))
                 .collect(),
             count: inside.len(),
         }

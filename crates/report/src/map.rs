@@ -141,10 +141,16 @@ struct Sheet {
 impl Sheet {
     fn of(site: &SiteProducts, shown: Shown) -> Self {
         let (footprints, terms) = (site.footprints, site.config.terms());
-        let place_rad = |row: usize| (footprints.longitude_rad[row], footprints.latitude_rad[row]);
+        let place_rad = |row: usize| {
+            (
+                footprints.longitude_rad.at(row),
+                footprints.latitude_rad.at(row),
+            )
+        };
         let height_m = |row: usize| footprints.topography_of_m(row);
-        let shots: Vec<Shot> = thinned(&shown.rows, MAP_SHOTS)
-            .into_iter()
+        let step = shown.rows.len().div_ceil(MAP_SHOTS).max(1);
+        let shots: Vec<Shot> = (shown.rows.iter().step_by(step))
+            .map(|row| row as usize)
             .map(|row| Shot {
                 place_rad: place_rad(row),
                 height_m: height_m(row),
@@ -166,7 +172,7 @@ impl Sheet {
             .filter_map(|point| map.project(point.0, point.1));
         let view = View::of(places);
         let ratio = (view.height_m() / view.width_m()).clamp(RATIO.0, RATIO.1);
-        let heights_m = shown.rows.iter().map(|row| height_m(*row)).fold(
+        let heights_m = shown.rows.iter().map(|row| height_m(row as usize)).fold(
             (f64::INFINITY, f64::NEG_INFINITY),
             |(low, high), height_m| (low.min(height_m), high.max(height_m)),
         );
@@ -201,7 +207,7 @@ impl Sheet {
         let shots = places
             .enumerate()
             .filter_map(|(row, (longitude, latitude))| {
-                let place = self.map.project(*longitude, *latitude)?;
+                let place = self.map.project(longitude, latitude)?;
                 Some((place, footprints.topography_of_m(row)))
             });
         Relief::of(&self.view, shots)
@@ -336,7 +342,7 @@ fn profiles(
 ) -> Vec<(String, Vec<(f64, f64)>)> {
     let mut on_sheet = vec![false; site.footprints.len()];
     for row in &shown.rows {
-        on_sheet[*row] = true;
+        on_sheet[row as usize] = true;
     }
     let mut named: BTreeMap<u32, Vec<(f64, f64)>> = BTreeMap::new();
     for profile in site.profiles {

@@ -128,10 +128,10 @@ fn footprints(before: &ImageProducts, after: &ImageProducts) -> Option<Plot> {
 /// Movement of each footprint that is within an image's lines before and after.
 fn moves(before: &RegisteredPoints, after: &RegisteredPoints) -> Vec<Arrow> {
     let places = |points: &RegisteredPoints| -> BTreeMap<(u32, u32), (f64, f64)> {
-        let own = (0..points.len()).filter(|index| !points.extrapolated[*index]);
+        let own = (0..points.len()).filter(|index| !points.extrapolated.at(*index));
         own.map(|index| {
-            let shot = (points.profile[index], points.row[index]);
-            (shot, (points.line[index], points.sample[index]))
+            let shot = (points.profile.at(index), points.row.at(index));
+            (shot, (points.line.at(index), points.sample.at(index)))
         })
         .collect()
     };

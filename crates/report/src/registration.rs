@@ -7,7 +7,7 @@ use super::{
     plots::{COLOURS, Extent, GREY, INK, Mark, Panel, Plot, Series, Style, figure, label, thinned},
     section::Section,
 };
-use areograph_base::{error::Result, verdict::CheckKind};
+use areograph_base::{column::Column as Values, error::Result, verdict::CheckKind};
 use areograph_geom::pushbroom::CameraModel;
 use areograph_products::{ImageProducts, SiteProducts};
 use areograph_stages::group_profiles::Profile;
@@ -76,11 +76,11 @@ fn profiles(site: &SiteProducts, images: &[Indexed]) -> Markup {
             if on_image.inside == 0 {
                 continue;
             }
-            let inside = |values: &[f64]| {
+            let inside = |values: &Values<f64>| {
                 let of = points.profile.iter().zip(&points.inside).zip(values);
-                let own = of.filter(|((profile, inside), _)| **profile == index && **inside);
+                let own = of.filter(|((profile, inside), _)| *profile == index && *inside);
                 let (low, high) = own.fold((f64::INFINITY, f64::NEG_INFINITY), |ends, (_, at)| {
-                    (ends.0.min(*at), ends.1.max(*at))
+                    (ends.0.min(at), ends.1.max(at))
                 });
                 format!("{low:.0} to {high:.0}")
             };
@@ -141,9 +141,9 @@ fn plane(profiles: &[Profile], image: &ImageProducts) -> Plot {
     };
     let mut dots: Vec<Vec<(f64, f64)>> = vec![Vec::new(); profiles.len()];
     for index in 0..points.len() {
-        let (line, sample) = (points.line[index], points.sample[index]);
-        if !points.extrapolated[index] && near.contains(sample) {
-            dots[points.profile[index] as usize].push((line, sample));
+        let (line, sample) = (points.line.at(index), points.sample.at(index));
+        if !points.extrapolated.at(index) && near.contains(sample) {
+            dots[points.profile.at(index) as usize].push((line, sample));
         }
     }
     let mut series: Vec<Series> = Vec::new();

@@ -42,7 +42,7 @@ fn write(site: &SiteProducts) -> Markup {
     let mut windows = Table::new("Windows", columns);
     for (bit, window) in site.config.windows.iter().enumerate() {
         let masks = site.footprints.windows.iter();
-        let shots = masks.filter(|mask| **mask >> bit & 1 == 1).count();
+        let shots = masks.filter(|mask| mask >> bit & 1 == 1).count();
         windows.row(
             true,
             [

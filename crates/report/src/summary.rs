@@ -12,7 +12,7 @@ use super::{
     section::Section,
     source::traced,
 };
-use areograph_base::{error::Result, footprints::AdjustmentModel, utc::Utc};
+use areograph_base::{error::Result, footprints::AdjustmentModel};
 use areograph_products::{Listed, SiteProducts};
 use areograph_stages::{
     compare_pairs::PairComparison,
@@ -80,8 +80,8 @@ fn about(site: &SiteProducts) -> Markup {
     let images = counted(site.images.len(), "image");
     let instants = site.utc.iter();
     let shot = days(
-        instants.clone().min().map(Utc::to_string),
-        instants.max().map(Utc::to_string),
+        instants.clone().min().map(|utc| utc.to_string()),
+        instants.max().map(|utc| utc.to_string()),
     );
     let footprints = counted(site.footprints.len(), "footprint");
     let profiles = counted(site.profiles.len(), "profile");

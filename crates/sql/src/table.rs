@@ -28,6 +28,7 @@ use tokio_stream::StreamExt as _;
 
 use super::conditions::Conditions;
 use areograph_base::{
+    column::Column,
     error::{Cause, Error, Locate as _, Result, Stopped},
     footprints::{AsRead, Footprints, SourceFile},
     time::Interval,
@@ -256,12 +257,17 @@ impl HandOn {
     }
 
     /// Checks that no earlier file contains one of these shots, which are in these records.
-    fn require_distinct(&mut self, file: usize, tags_s: &[f64], records: &[u32]) -> Result<()> {
+    fn require_distinct(
+        &mut self,
+        file: usize,
+        tags_s: &Column<f64>,
+        records: &Column<u32>,
+    ) -> Result<()> {
         let Some((row, other)) = self.seen.take_all(file, tags_s) else {
             return Ok(());
         };
         let overlap = Overlap {
-            record: records[row],
+            record: records.at(row),
             other: self.paths[other].display().to_string(),
         };
         Err(overlap).in_file(&self.paths[file])

@@ -175,7 +175,7 @@ fn simultaneous(
     let profiles = profiles.iter();
     let with_image = profiles.filter(|of| of.simultaneous.iter().any(|of| of.image == index));
     let rows = with_image.flat_map(|profile| profile.rows.iter().copied());
-    rows.filter(|row| exposures.contains(Et::from_seconds(footprints.et_s[*row as usize])))
+    rows.filter(|row| exposures.contains(Et::from_seconds(footprints.et_s.at(*row as usize))))
         .collect()
 }
 
@@ -211,7 +211,7 @@ impl Placed<'_> {
             return Err(BeamGap::NoPosition);
         }
         let inside: BTreeMap<u32, bool> = (0..self.points.len())
-            .map(|index| (self.points.row[index], self.points.inside[index]))
+            .map(|index| (self.points.row.at(index), self.points.inside.at(index)))
             .collect();
         let (mut angles_rad, mut ranges_m) = ([Vec::new(), Vec::new()], Vec::new());
         let mut apart_m = Vec::new();

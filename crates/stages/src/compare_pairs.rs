@@ -414,12 +414,12 @@ struct Place {
 fn places(registration: &ImageRegistration) -> BTreeMap<(u32, u32), Place> {
     let points = &registration.points;
     (0..points.len())
-        .filter(|index| !points.extrapolated[*index])
+        .filter(|index| !points.extrapolated.at(*index))
         .map(|index| {
-            let shot = (points.profile[index], points.row[index]);
+            let shot = (points.profile.at(index), points.row.at(index));
             let place = Place {
-                at: [points.line[index], points.sample[index]],
-                inside: points.inside[index],
+                at: [points.line.at(index), points.sample.at(index)],
+                inside: points.inside.at(index),
             };
             (shot, place)
         })
@@ -431,8 +431,8 @@ fn shot_spacing_m(footprints: &Footprints<BodyFixed>, profile: &Profile) -> Opti
     let ground_m = |row: &u32| {
         let row = *row as usize;
         spherical_to_xyz_m(
-            footprints.longitude_rad[row],
-            footprints.latitude_rad[row],
+            footprints.longitude_rad.at(row),
+            footprints.latitude_rad.at(row),
             footprints.ground_radius_m(row),
         )
     };

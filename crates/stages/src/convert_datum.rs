@@ -9,6 +9,7 @@ use super::search_footprints::SearchResult;
 use areograph_base::{
     altimetry::{BiasScope, GroundRadius, MolaClock, TagSign},
     body::{Body, Datum},
+    column::Column,
     error::Result,
     footprints::{AsRead, Footprint, Footprints, SourceFile},
     frames::BodyFixed,
@@ -61,7 +62,7 @@ stage_inputs! {
 
 impl Stage for ConvertDatum<'_> {
     const NAME: &'static str = "convert_datum";
-    const METHOD: u32 = 5;
+    const METHOD: u32 = 6;
     const CHECKED: bool = true;
     type Output = Converted;
     stage_inputs!(fingerprint);
@@ -107,16 +108,16 @@ pub fn convert_datum(footprints: Footprints<AsRead>, clock: &MolaClock) -> Conve
             )
         })
         .collect();
-    let mut shifts = vec![(Vec::new(), Vec::new()); footprints.files.len()];
+    let mut shifts = vec![(Column::new(), Column::new()); footprints.files.len()];
     let footprints = turned(footprints, clock, Shift::of, |file, shift| {
         let (shift_m, turn_deg) = &mut shifts[file];
         shift_m.push(shift.ground_m);
         turn_deg.push(shift.turn_rad / RADIANS_PER_DEGREE);
     });
-    let conversion = |(shift_m, turn_deg): &(Vec<f64>, Vec<f64>)| FileConversion {
+    let conversion = |(shift_m, turn_deg): &(Column<f64>, Column<f64>)| FileConversion {
         shots: u32::try_from(shift_m.len()).unwrap_or(u32::MAX),
-        shift_m: Summary::of(shift_m),
-        longitude_shift_deg: Summary::of(turn_deg),
+        shift_m: Summary::over(|| shift_m.iter()),
+        longitude_shift_deg: Summary::over(|| turn_deg.iter()),
     };
     Converted {
         files: shifts.iter().map(conversion).collect(),
@@ -167,11 +168,17 @@ fn turned<M: Default + Send>(
         .map(|file| DatumTurn::new(file.datum, clock))
         .collect();
     let mut converted = footprints.declare::<BodyFixed>();
+    let [
+        mut longitude_rad,
+        mut latitude_rad,
+        mut spacecraft_longitude_rad,
+        mut spacecraft_latitude_rad,
+    ] = [const { Column::<f64>::new() }; 4];
     let rows = converted.len();
     for start in (0..rows).step_by(ROWS_AT_ONCE) {
         let rows = start..rows.min(start + ROWS_AT_ONCE);
         let moved = rows.clone().into_par_iter().map(|row| {
-            let datum = &datums[usize::from(converted.file[row])];
+            let datum = &datums[usize::from(converted.file.at(row))];
             // A row is not gathered from its columns in vain.
             let shot = (!datum.is_none()).then(|| converted.row(row))?;
             let moved = datum.moved(&shot)?;
@@ -179,17 +186,28 @@ fn turned<M: Default + Send>(
         });
         let moved: Vec<Option<(Places, M)>> = moved.collect();
         for (row, moved) in rows.zip(moved) {
-            let measured = moved.map_or_else(M::default, |([ground, spacecraft], measured)| {
-                (converted.longitude_rad[row], converted.latitude_rad[row]) = ground;
-                (
-                    converted.spacecraft_longitude_rad[row],
-                    converted.spacecraft_latitude_rad[row],
-                ) = spacecraft;
-                measured
+            let ([ground, spacecraft], measured) = moved.unwrap_or_else(|| {
+                let ground = (
+                    converted.longitude_rad.at(row),
+                    converted.latitude_rad.at(row),
+                );
+                let spacecraft = (
+                    converted.spacecraft_longitude_rad.at(row),
+                    converted.spacecraft_latitude_rad.at(row),
+                );
+                ([ground, spacecraft], M::default())
             });
-            record(usize::from(converted.file[row]), measured);
+            longitude_rad.push(ground.0);
+            latitude_rad.push(ground.1);
+            spacecraft_longitude_rad.push(spacecraft.0);
+            spacecraft_latitude_rad.push(spacecraft.1);
+            record(usize::from(converted.file.at(row)), measured);
         }
     }
+    converted.longitude_rad = longitude_rad;
+    converted.latitude_rad = latitude_rad;
+    converted.spacecraft_longitude_rad = spacecraft_longitude_rad;
+    converted.spacecraft_latitude_rad = spacecraft_latitude_rad;
     converted
 }
 
@@ -356,12 +374,17 @@ mod tests {
             convert_datum(footprints(Datum::Iau1991), &clock(BiasScope::SpkLookup)).footprints;
         // CSPICE N0067 with a PCK of the 1991 and one of the 2000 constants; 1e-9 rad is 3 mm.
         assert!(
-            (converted.longitude_rad[0] - 318.237_630_071_608_63 * RADIANS_PER_DEGREE).abs() < 1e-9
+            (converted.longitude_rad.at(0) - 318.237_630_071_608_63 * RADIANS_PER_DEGREE).abs()
+                < 1e-9
         );
         assert!(
-            (converted.latitude_rad[0] + 13.400_493_296_569_078 * RADIANS_PER_DEGREE).abs() < 1e-9
+            (converted.latitude_rad.at(0) + 13.400_493_296_569_078 * RADIANS_PER_DEGREE).abs()
+                < 1e-9
         );
-        assert!((converted.spacecraft_longitude_rad[0] - converted.longitude_rad[0]).abs() < 1e-15);
+        assert!(
+            (converted.spacecraft_longitude_rad.at(0) - converted.longitude_rad.at(0)).abs()
+                < 1e-15
+        );
     }
 
     #[test]
@@ -378,7 +401,7 @@ mod tests {
     #[test]
     fn the_rotation_scope_turns_mars_by_the_bias() {
         let after = convert_datum(footprints(Datum::Iau2000), &clock(BiasScope::Both));
-        let turned_rad = wrap_pi(after.footprints.longitude_rad[0] - 318.0 * RADIANS_PER_DEGREE);
+        let turned_rad = wrap_pi(after.footprints.longitude_rad.at(0) - 318.0 * RADIANS_PER_DEGREE);
         // 350.89198 deg/day x 0.117 s = 4.7517e-4 deg; entering at an earlier time, longitudes grow.
         assert!(
             (turned_rad / RADIANS_PER_DEGREE - 4.7517e-4).abs() < 1e-8,

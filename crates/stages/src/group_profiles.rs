@@ -60,14 +60,14 @@ impl Profile {
     #[must_use]
     pub fn off_nadir_rad(&self, footprints: &Footprints<BodyFixed>) -> f64 {
         let angles_rad = self.rows.iter();
-        let angles_rad = angles_rad.map(|row| footprints.off_nadir_rad[*row as usize].abs());
+        let angles_rad = angles_rad.map(|row| footprints.off_nadir_rad.at(*row as usize).abs());
         median(&mut angles_rad.collect::<Vec<f64>>())
     }
 
     /// Whether its file states the attitude of every shot.
     #[must_use]
     pub fn attitude_is_known(&self, footprints: &Footprints<BodyFixed>) -> bool {
-        let flag = |row: &u32| footprints.attitude_flag[*row as usize];
+        let flag = |row: &u32| footprints.attitude_flag.at(*row as usize);
         self.rows.iter().all(|row| flag(row) < NO_ATTITUDE)
     }
 }
@@ -112,19 +112,24 @@ pub fn group_profiles(
     for (bit, window) in windows.iter().enumerate() {
         let mut rows: Vec<u32> = (0_u32..)
             .zip(&footprints.windows)
-            .filter(|(_, mask)| *mask >> bit & 1 == 1)
+            .filter(|(_, mask)| mask >> bit & 1 == 1)
             .map(|(row, _)| row)
             .collect();
         // The sort is stable: shots with equal times stay in file order.
-        rows.sort_by(|a, b| footprints.et_s[*a as usize].total_cmp(&footprints.et_s[*b as usize]));
+        rows.sort_by(|a, b| {
+            footprints
+                .et_s
+                .at(*a as usize)
+                .total_cmp(&footprints.et_s.at(*b as usize))
+        });
         let crossings = rows.chunk_by(|a, b| {
             let (a, b) = (*a as usize, *b as usize);
-            footprints.orbit[a] == footprints.orbit[b]
-                && footprints.et_s[b] - footprints.et_s[a] <= Profile::PAUSE_S
+            footprints.orbit.at(a) == footprints.orbit.at(b)
+                && footprints.et_s.at(b) - footprints.et_s.at(a) <= Profile::PAUSE_S
         });
         let first_of_window = profiles.len();
         for rows in crossings {
-            let orbit = footprints.orbit[rows[0] as usize];
+            let orbit = footprints.orbit.at(rows[0] as usize);
             let earlier = profiles[first_of_window..]
                 .iter()
                 .filter(|profile: &&Profile| profile.orbit == orbit)
@@ -142,8 +147,8 @@ fn profile(
     rows: &[u32],
     images: &[ImageTimes],
 ) -> Profile {
-    let time = |row: &u32| Et::from_seconds(footprints.et_s[*row as usize]);
-    let orbit = footprints.orbit[rows[0] as usize];
+    let time = |row: &u32| Et::from_seconds(footprints.et_s.at(*row as usize));
+    let orbit = footprints.orbit.at(rows[0] as usize);
     let suffix = if earlier == 0 {
         String::new()
     } else {

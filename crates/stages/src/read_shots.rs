@@ -71,7 +71,7 @@ impl Input for ShotFiles<'_> {
 
 impl Stage for ReadShots<'_> {
     const NAME: &'static str = "search_footprints";
-    const METHOD: u32 = 7;
+    const METHOD: u32 = 8;
     const CHECKED: bool = true;
     type Output = SearchResult;
     stage_inputs!(fingerprint);
@@ -208,7 +208,7 @@ fn passes_off_nadir(footprints: &mut Footprints<AsRead>) -> Option<String> {
         .map(|row| footprints.row(row))
         .collect();
     let off_nadir = OffNadir::of(&shots);
-    footprints.off_nadir_rad = off_nadir.angles_rad;
+    footprints.off_nadir_rad = off_nadir.angles_rad.into();
     let passes = off_nadir.passes.into_iter().map(|pass| {
         let angle_deg = pass.angle_rad / RADIANS_PER_DEGREE;
         format!("orbit {} ({angle_deg:.0}°)", pass.orbit)
@@ -336,7 +336,7 @@ impl Gathered<'_> {
                 notes.extend(passes_off_nadir(&mut result.footprints));
             }
             let flags = result.footprints.attitude_flag.iter();
-            let unknown = flags.filter(|flag| **flag >= NO_ATTITUDE).count();
+            let unknown = flags.filter(|flag| *flag >= NO_ATTITUDE).count();
             if unknown > 0 {
                 notes.push(format!(
                     "{unknown} shots in the windows have attitude flag 2 or 3: their positions assume that the laser \

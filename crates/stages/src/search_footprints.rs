@@ -98,7 +98,7 @@ impl Input for KnownPlaces<'_> {
 
 impl Stage for SearchFootprints<'_> {
     const NAME: &'static str = STAGE;
-    const METHOD: u32 = 7;
+    const METHOD: u32 = 8;
     const CHECKED: bool = true;
     type Output = SearchResult;
     stage_inputs!(fingerprint);
@@ -273,7 +273,8 @@ impl Gathered<'_> {
 impl Sink for Gathered<'_> {
     fn found(&mut self, file: usize, mut found: Found) -> Result<()> {
         let result = &mut self.result;
-        found.footprints.file.fill(self.searched[file]);
+        let searched = self.searched[file];
+        found.footprints.file = found.footprints.file.changed(|_, _| searched);
         result.footprints.append(found.footprints);
         let room = COMPLAINTS_MAX.saturating_sub(result.complaints.len());
         result

@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use super::convert_datum::Converted;
 use areograph_base::{
+    column::Column,
     error::{Result, Stopped},
-    packed,
     time::Et,
     utc::Utc,
 };
@@ -30,24 +30,24 @@ stage_inputs! {
 /// UTC of the corrected times, in the order of the footprints.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
-pub struct ShotTimes(#[serde(with = "packed")] pub Vec<Utc>);
+pub struct ShotTimes(pub Column<Utc>);
 
 impl Stage for TagUtc<'_> {
     const NAME: &'static str = "tag_utc";
-    const METHOD: u32 = 4;
+    const METHOD: u32 = 5;
     type Output = ShotTimes;
     stage_inputs!(fingerprint);
 
     fn run(&self, stop: &AtomicBool) -> Result<ShotTimes> {
         let session = self.kernels.session()?;
         let instants = self.converted.value()?.footprints.et_s.iter();
-        if let Some(last_s) = instants.clone().copied().reduce(f64::max) {
+        if let Some(last_s) = instants.clone().reduce(f64::max) {
             session.require_published_utc(Et::from_seconds(last_s))?;
         }
         let mut clock = UtcClock::new(session);
         let utc = instants.map(|et_s| {
             Stopped::check(stop)?;
-            clock.utc(Et::from_seconds(*et_s))
+            clock.utc(Et::from_seconds(et_s))
         });
         Ok(ShotTimes(utc.collect::<Result<_>>()?))
     }

@@ -7,7 +7,7 @@
 use std::{
     collections::BTreeMap,
     fs::File,
-    io::Write as _,
+    io::{self, Read, Write as _},
     path::{Path, PathBuf},
     sync::{
         Mutex, PoisonError,
@@ -32,13 +32,17 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     flushed(StagedFile::create(path)?, bytes)
 }
 
-/// Writes bytes in several consecutive parts, and does not wait until they are on the disk: see
+/// Writes `head`, and behind it all that `payload` contains, and does not wait until they are on the disk: see
 /// [`StagedFile::finish_unflushed`].
 ///
 /// # Errors
-/// As [`write()`].
-pub fn write_unflushed(path: &Path, parts: &[&[u8]]) -> Result<()> {
-    filled(StagedFile::create(path)?, parts)?.finish_unflushed()
+/// As [`write()`]; `payload` cannot be read.
+pub fn write_unflushed(path: &Path, head: &[u8], payload: &mut impl Read) -> Result<()> {
+    filled(StagedFile::create(path)?, |writer| {
+        writer.write_all(head)?;
+        io::copy(payload, writer).map(drop)
+    })?
+    .finish_unflushed()
 }
 
 /// Writes at a path of the user, where an existing file is replaced only if it has this mark.
@@ -54,21 +58,25 @@ pub fn replace(path: &Path, bytes: &[u8], mark: Mark) -> Result<()> {
 /// # Errors
 /// As [`replace`].
 pub fn replace_unflushed(path: &Path, bytes: &[u8], mark: Mark) -> Result<()> {
-    filled(StagedFile::replacing(path, mark)?, &[bytes])?.finish_unflushed()
+    let staged = StagedFile::replacing(path, mark)?;
+    filled(staged, |writer| writer.write_all(bytes))?.finish_unflushed()
 }
 
 fn flushed(staged: StagedFile, bytes: &[u8]) -> Result<()> {
     let path = staged.path().to_owned();
-    filled(staged, &[bytes])?.finish()?;
+    filled(staged, |writer| writer.write_all(bytes))?.finish()?;
     sync_folder(path.parent().unwrap_or(Path::new(".")));
     Ok(())
 }
 
-fn filled(staged: StagedFile, parts: &[&[u8]]) -> Result<StagedFile> {
-    let mut writer = staged.writer()?;
-    let written = parts.iter().try_for_each(|part| writer.write_all(part));
-    let written = written.map_err(IoError::on("write"));
-    written.in_file(staged.path())?;
+fn filled(
+    staged: StagedFile,
+    write: impl FnOnce(&mut File) -> io::Result<()>,
+) -> Result<StagedFile> {
+    let written = write(&mut staged.writer()?);
+    written
+        .map_err(IoError::on("write"))
+        .in_file(staged.path())?;
     Ok(staged)
 }
 

@@ -7,7 +7,7 @@
 use std::{
     collections::BTreeSet,
     fs::{self, File},
-    io::{ErrorKind, Read as _},
+    io::{BufWriter, ErrorKind, Read, Seek, Write as _},
     path::{Path, PathBuf},
     sync::{
         Arc,
@@ -16,19 +16,24 @@ use std::{
 };
 
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use tempfile::SpooledTempFile;
 
 use super::atomic;
 use crate::{
     files::InputFiles,
+    hashed::{HASHED_AT_ONCE, Hashed},
     stage::{Inputs, Output, Provenance, Reason},
 };
 use areograph_base::{
-    error::{Cause, Locate, Result},
+    column::require_kept,
+    error::{Cause, IoError, Locate, Result},
     stored::whole,
 };
 
 /// Largest output that is read at once, bytes: a larger one is read on demand.
 const READ_AT_ONCE: u64 = 1 << 16;
+/// Bytes of an output that are held in memory before they are written.
+const HELD_BYTES: usize = 1 << 20;
 /// Bytes of a file that usually contain its header.
 const HEAD_BYTES: u64 = 1 << 16;
 
@@ -155,24 +160,42 @@ impl StageCache {
             stage: label.to_owned(),
             source,
         };
-        let payload = whole(|| postcard::to_stdvec(&value)).map_err(unstorable)?;
+        let path = self.path(label);
+        // The head contains the hash, and is written first.
+        let mut payload = SpooledTempFile::new(HELD_BYTES);
+        let mut writer = BufWriter::with_capacity(HASHED_AT_ONCE, Hashed::new(&mut payload));
+        let stored = whole(|| postcard::to_io(&value, &mut writer)).map(drop);
+        let flushed = writer.flush();
+        if let Some(refusal) = writer.get_mut().refusal.take() {
+            return Err(IoError::on("write beside")(refusal)).in_file(&path);
+        }
+        stored.map_err(unstorable)?;
+        flushed
+            .map_err(IoError::on("write beside"))
+            .in_file(&path)?;
+        require_kept()?;
+        let (blake3, payload_bytes) = (writer.get_ref().hash(), writer.get_ref().bytes);
+        drop(writer);
         // A field that is skipped when written cannot be read back, and the stage would run again every time.
         debug_assert!(
-            read::<T>(&payload).is_some(),
+            can_be_read::<T>(&mut payload),
             "the output of {label} cannot be read back"
         );
         let provenance = Provenance {
-            blake3: blake3::hash(&payload).to_hex().to_string(),
+            blake3: blake3.to_hex().to_string(),
             fingerprint: inputs.fingerprint(),
         };
         let head = Head {
             inputs,
             blake3: provenance.blake3.clone(),
-            payload_bytes: payload.len() as u64,
+            payload_bytes,
         };
         let head = postcard::to_stdvec(&head).map_err(unstorable)?;
-        let path = self.path(label);
-        atomic::write_unflushed(&path, &[&head, &payload]).in_file(&path)?;
+        payload
+            .rewind()
+            .map_err(IoError::on("write beside"))
+            .in_file(&path)?;
+        atomic::write_unflushed(&path, &head, &mut payload).in_file(&path)?;
         self.own.forget(&path);
         Ok(Output::known(label.to_owned(), value, provenance))
     }
@@ -217,7 +240,8 @@ fn read_head(file: &mut File) -> Option<(Head, u64)> {
     let mut bytes = Vec::new();
     loop {
         let wanted = (bytes.len() as u64).max(HEAD_BYTES);
-        let read = file.by_ref().take(wanted).read_to_end(&mut bytes).ok()?;
+        let more = Read::by_ref(file).take(wanted);
+        let read = { more }.read_to_end(&mut bytes).ok()?;
         match postcard::take_from_bytes::<Head>(&bytes) {
             Ok((head, rest)) => return Some((head, (bytes.len() - rest.len()) as u64)),
             Err(postcard::Error::DeserializeUnexpectedEnd) if read > 0 => {}
@@ -244,6 +268,15 @@ fn read_intact<T: DeserializeOwned>(path: &Path) -> Option<(Head, T)> {
     let intact = *blake3::hash(payload).to_hex() == *head.blake3;
     let value = intact.then(|| read(payload))??;
     Some((head, value))
+}
+
+/// Whether the file contains exactly the stored form of an output.
+fn can_be_read<T: DeserializeOwned>(payload: &mut (impl Read + Seek)) -> bool {
+    let mut bytes = Vec::new();
+    let all = payload
+        .rewind()
+        .and_then(|()| payload.read_to_end(&mut bytes));
+    all.is_ok() && read::<T>(&bytes).is_some()
 }
 
 /// An output, if these bytes are exactly its stored form.

@@ -18,6 +18,7 @@ pub mod atomic;
 pub mod book;
 pub mod cache;
 pub mod files;
+mod hashed;
 pub mod hashes;
 pub mod lock;
 pub mod manifest;

@@ -32,8 +32,14 @@ pub mod track;
 
 use std::path::{Path, PathBuf};
 
-use areograph_base::{line_times::LineTimes, time::Et};
+use areograph_base::{column::Column, line_times::LineTimes, packed::Packed, time::Et};
 use proptest::test_runner::{Config, FileFailurePersistence};
+
+/// Replaces the value in a row of a column.
+pub fn replace<T: Packed>(column: &mut Column<T>, row: usize, value: T) {
+    assert!(row < column.len());
+    *column = column.changed(|at, before| if at == row { value } else { before });
+}
 
 /// The folder of the checkout.
 pub fn checkout() -> &'static Path {

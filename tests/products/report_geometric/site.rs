@@ -139,7 +139,7 @@ impl Site {
             images: &images,
             conversions: &self.converted.files,
             footprints: &self.converted.footprints,
-            utc: &vec![Utc::from_microseconds(0); self.converted.footprints.len()],
+            utc: &vec![Utc::from_microseconds(0); self.converted.footprints.len()].into(),
             profiles: &self.profiles,
             profile_check: &self.profile_check,
             ranges: &self.ranges,

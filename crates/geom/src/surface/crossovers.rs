@@ -7,6 +7,7 @@ use super::{
     Placed, Plan, SharedErrors, SurfaceOptions, SurfaceShot, Variogram,
     variogram::{GAP, usual_step_m},
 };
+use crate::ellipsoid::height_m;
 
 /// Edge of a cell in which segments of profiles are looked up, metres.
 const CELL_M: f64 = 1_000.0;
@@ -36,9 +37,9 @@ pub struct Crossover {
 }
 
 /// A segment between two successive shots of a profile.
-struct Segment<'a> {
-    from: &'a Placed,
-    to: &'a Placed,
+struct Segment {
+    from: Placed,
+    to: Placed,
     /// Index of its first shot.
     at: usize,
     /// Mean square difference of successive heights around it, without noise, m².
@@ -50,43 +51,36 @@ struct Segment<'a> {
 
 /// Every crossing of two profiles, in the order of the profiles.
 ///
-/// `shots` are in their order along the profiles. Gaps of a profile are not crossed.
+/// `shots` are in their order along the profiles. Gaps of a profile are not crossed. Of each shot only the place in plan is
+/// held, and of each segment only its cells: of millions of segments few cross another.
 #[must_use]
 pub fn crossovers(shots: &[SurfaceShot], options: &SurfaceOptions) -> Vec<Crossover> {
     let model = options.body.model();
     let plan = Plan::around(model, shots.iter().map(|shot| shot.ground_m));
-    let placed: Vec<Placed> = shots
-        .par_iter()
-        .map(|shot| Placed::new(model, &plan, shot, options.profile_sigma_m))
-        .collect();
-    let segments = segments(&placed, options.shot_sigma_m);
-    // Each segment is listed in every cell of its bounding box; sorted by cell.
-    let mut entries: Vec<([i64; 2], usize)> = Vec::with_capacity(segments.len());
-    for (index, segment) in segments.iter().enumerate() {
-        let [one, other] = [cell(&segment.from.plan_m), cell(&segment.to.plan_m)];
-        for east in one[0].min(other[0])..=one[0].max(other[0]) {
-            for north in one[1].min(other[1])..=one[1].max(other[1]) {
-                entries.push(([east, north], index));
-            }
-        }
-    }
+    let tracks = Tracks {
+        shots,
+        plan_m: (shots.par_iter().map(|shot| plan.of(&shot.ground_m))).collect(),
+        options,
+    };
+    let mut entries = tracks.entries();
     entries.par_sort_unstable();
-    let cells: Vec<&[([i64; 2], usize)]> = entries.chunk_by(|one, next| one.0 == next.0).collect();
-    let of_cell = |inside: &&[([i64; 2], usize)]| {
+    let of_cell = |inside: &[([i32; 2], u32)]| {
         let mut found = Vec::new();
         for (position, (own, first)) in inside.iter().enumerate() {
             for (_, second) in &inside[position + 1..] {
-                let (first, second) = (&segments[*first], &segments[*second]);
-                if let Some((shares, place)) = crossing(first, second)
+                let pair = [*first as usize, *second as usize];
+                if let Some((shares, place)) = tracks.crossing(pair)
                     && cell(&place) == *own
                 {
-                    found.push(crossover(shots, [first, second], shares, options));
+                    let [first, second] = pair.map(|at| tracks.segment(at));
+                    found.push(crossover(shots, [&first, &second], shares, options));
                 }
             }
         }
         found
     };
-    let mut found: Vec<Crossover> = cells.par_iter().flat_map_iter(of_cell).collect();
+    let cells = entries.par_chunk_by(|one, next| one.0 == next.0);
+    let mut found: Vec<Crossover> = cells.flat_map_iter(of_cell).collect();
     found.sort_by(|one, other| {
         let by_place = one.place_m.z.total_cmp(&other.place_m.z);
         one.profiles.cmp(&other.profiles).then(by_place)
@@ -94,52 +88,96 @@ pub fn crossovers(shots: &[SurfaceShot], options: &SurfaceOptions) -> Vec<Crosso
     found
 }
 
-fn segments(placed: &[Placed], shot_sigma_m: f64) -> Vec<Segment<'_>> {
-    let longest_m = GAP * usual_step_m(placed);
-    let mut segments = Vec::new();
-    let mut first = 0;
-    for profile in placed.chunk_by(|one, next| one.profile == next.profile) {
-        for (index, pair) in profile.windows(2).enumerate() {
-            let length_m = (pair[1].plan_m - pair[0].plan_m).norm();
-            if length_m > 0.0 && length_m <= longest_m {
-                let around = &profile[index.saturating_sub(AROUND)..];
-                let around = &around[..around.len().min(2 * AROUND + 2)];
-                let squares = around
-                    .windows(2)
-                    .map(|pair| (pair[1].height_m - pair[0].height_m).powi(2));
-                let mean_m2 = squares.sum::<f64>() / (around.len() - 1) as f64;
-                let wide = [
-                    &profile[index.saturating_sub(1)],
-                    &profile[(index + 2).min(profile.len() - 1)],
-                ];
-                let wide_m = (wide[1].plan_m - wide[0].plan_m).norm().max(length_m);
-                segments.push(Segment {
-                    from: &pair[0],
-                    to: &pair[1],
-                    at: first + index,
-                    rough_m2: (mean_m2 - 2.0 * shot_sigma_m.powi(2)).max(0.0),
-                    slope: (wide[1].height_m - wide[0].height_m) / wide_m,
-                    slope_base_m: wide_m,
-                });
-            }
-        }
-        first += profile.len();
-    }
-    segments
+/// Shots along profiles with their places in plan.
+struct Tracks<'a> {
+    shots: &'a [SurfaceShot],
+    plan_m: Vec<Vector2<f64>>,
+    options: &'a SurfaceOptions,
 }
 
-/// Shares of two segments of different profiles at which they cross, and the place.
-fn crossing(first: &Segment, second: &Segment) -> Option<([f64; 2], Vector2<f64>)> {
-    if first.from.profile == second.from.profile {
-        return None;
+impl Tracks<'_> {
+    /// Each segment in every cell of its bounding box, by the index of its first shot.
+    fn entries(&self) -> Vec<([i32; 2], u32)> {
+        let places = self.shots.iter().zip(&self.plan_m);
+        let longest_m = GAP * usual_step_m(places.map(|(shot, plan_m)| (shot.profile, *plan_m)));
+        let is_segment = |at: &usize| {
+            let length_m = (self.plan_m[at + 1] - self.plan_m[*at]).norm();
+            self.shots[*at].profile == self.shots[at + 1].profile
+                && length_m > 0.0
+                && length_m <= longest_m
+        };
+        let segments = || (0..self.shots.len().saturating_sub(1)).filter(is_segment);
+        let bounds = |at: usize| {
+            let [one, other] = [cell(&self.plan_m[at]), cell(&self.plan_m[at + 1])];
+            [0, 1].map(|axis| one[axis].min(other[axis])..=one[axis].max(other[axis]))
+        };
+        let cells = |at: usize| {
+            let [east, north] = bounds(at);
+            east.flat_map(move |east| north.clone().map(move |north| [east, north]))
+        };
+        // Counted first: these are the most numerous values of a large site.
+        let count = segments().map(|at| cells(at).count()).sum();
+        let mut entries = Vec::with_capacity(count);
+        for (at, first) in segments().filter_map(|at| Some((at, u32::try_from(at).ok()?))) {
+            entries.extend(cells(at).map(|cell| (cell, first)));
+        }
+        entries
     }
-    let [along, across] = [first, second].map(|of| of.to.plan_m - of.from.plan_m);
-    let apart = second.from.plan_m - first.from.plan_m;
-    let cross = along.perp(&across);
-    let shares = [apart.perp(&across) / cross, apart.perp(&along) / cross];
-    // Parallel segments have infinite shares, or NaN.
-    let inside = shares.iter().all(|share| (0.0..1.0).contains(share));
-    inside.then(|| (shares, first.from.plan_m + along * shares[0]))
+
+    fn placed(&self, at: usize) -> Placed {
+        let (shot, model) = (&self.shots[at], self.options.body.model());
+        Placed {
+            plan_m: self.plan_m[at],
+            height_m: height_m(model, &shot.ground_m).0,
+            profile: shot.profile,
+            shared: shot.shared(self.options.profile_sigma_m),
+        }
+    }
+
+    /// The segment from the shot with this index to the next one.
+    fn segment(&self, at: usize) -> Segment {
+        let profile = self.shots[at].profile;
+        let is_own = |at: &usize| self.shots.get(*at).is_some_and(|of| of.profile == profile);
+        let before = (at.saturating_sub(AROUND)..at).rev().take_while(is_own);
+        let first = before.last().unwrap_or(at);
+        let behind = (first..first + 2 * AROUND + 2).take_while(is_own);
+        let around: Vec<Placed> = behind.map(|at| self.placed(at)).collect();
+        let squares = around
+            .windows(2)
+            .map(|pair| (pair[1].height_m - pair[0].height_m).powi(2));
+        let mean_m2 = squares.sum::<f64>() / (around.len() - 1) as f64;
+        let [from, to] = [self.placed(at), self.placed(at + 1)];
+        let length_m = (to.plan_m - from.plan_m).norm();
+        let wide = [
+            at.checked_sub(1).filter(is_own).unwrap_or(at),
+            Some(at + 2).filter(is_own).unwrap_or(at + 1),
+        ];
+        let wide = wide.map(|at| self.placed(at));
+        let wide_m = (wide[1].plan_m - wide[0].plan_m).norm().max(length_m);
+        Segment {
+            from,
+            to,
+            at,
+            rough_m2: (mean_m2 - 2.0 * self.options.shot_sigma_m.powi(2)).max(0.0),
+            slope: (wide[1].height_m - wide[0].height_m) / wide_m,
+            slope_base_m: wide_m,
+        }
+    }
+
+    /// Shares of the segments from two shots of different profiles at which they cross, and the place.
+    fn crossing(&self, pair: [usize; 2]) -> Option<([f64; 2], Vector2<f64>)> {
+        let [first, second] = pair;
+        if self.shots[first].profile == self.shots[second].profile {
+            return None;
+        }
+        let [along, across] = pair.map(|at| self.plan_m[at + 1] - self.plan_m[at]);
+        let apart = self.plan_m[second] - self.plan_m[first];
+        let cross = along.perp(&across);
+        let shares = [apart.perp(&across) / cross, apart.perp(&along) / cross];
+        // Parallel segments have infinite shares, or NaN.
+        let inside = shares.iter().all(|share| (0.0..1.0).contains(share));
+        inside.then(|| (shares, self.plan_m[first] + along * shares[0]))
+    }
 }
 
 fn crossover(
@@ -223,8 +261,8 @@ fn expected_slope(segments: [&Segment; 2], options: &SurfaceOptions) -> (Vector2
     clippy::cast_possible_truncation,
     reason = "a site is a few hundred cells across"
 )]
-fn cell(place_m: &Vector2<f64>) -> [i64; 2] {
-    [place_m.x, place_m.y].map(|component_m| (component_m / CELL_M).floor() as i64)
+fn cell(place_m: &Vector2<f64>) -> [i32; 2] {
+    [place_m.x, place_m.y].map(|component_m| (component_m / CELL_M).floor() as i32)
 }
 
 #[cfg(test)]
@@ -249,8 +287,8 @@ mod tests {
             .map(|(profile, end_m)| [placed(-end_m, profile), placed(*end_m, profile)])
             .collect();
         let segment = |index: usize| Segment {
-            from: &shots[index][0],
-            to: &shots[index][1],
+            from: shots[index][0],
+            to: shots[index][1],
             at: 2 * index,
             rough_m2: rough_m.powi(2),
             slope: slopes[index],

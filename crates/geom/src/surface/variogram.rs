@@ -90,7 +90,7 @@ impl Roughness {
     /// Roughness from heights of shots of every profile up to ten spacings apart, their noise removed.
     pub(super) fn learn(shots: &[Placed], options: &SurfaceOptions) -> Self {
         let noise_m2 = 2.0 * options.shot_sigma_m.powi(2);
-        let longest_m = GAP * usual_step_m(shots);
+        let longest_m = GAP * usual_step_m(shots.iter().map(|of| (of.profile, of.plan_m)));
         let mut sums = Sums::default();
         let mut cells: BTreeMap<[i64; 2], Sums> = BTreeMap::new();
         for profile in shots.chunk_by(|one, next| one.profile == next.profile) {
@@ -179,11 +179,13 @@ fn cell(place_m: &Vector2<f64>) -> [i64; 2] {
 }
 
 /// Median distance of successive shots of a profile, metres; infinite without any.
-pub(super) fn usual_step_m(shots: &[Placed]) -> f64 {
-    let pairs = shots.iter().zip(shots.get(1..).unwrap_or_default());
+///
+/// * `places` – the profile of every shot, and its place in plan
+pub(super) fn usual_step_m(places: impl Iterator<Item = (usize, Vector2<f64>)> + Clone) -> f64 {
+    let pairs = places.clone().zip(places.skip(1));
     let mut steps_m: Vec<f64> = pairs
-        .filter(|(one, next)| one.profile == next.profile)
-        .map(|(one, next)| (one.plan_m - next.plan_m).norm())
+        .filter(|((profile, _), (next, _))| profile == next)
+        .map(|((_, place_m), (_, next_m))| (place_m - next_m).norm())
         .collect();
     steps_m.sort_unstable_by(f64::total_cmp);
     steps_m

@@ -134,24 +134,23 @@ fn candidates(shots: &[SurfaceShot], profile: usize, sampled: &[&Vector3<f64>]) 
     let middle = sampled[sampled.len() / 2];
     let reach_m = sampled.iter().map(|of| (*of - middle).norm());
     let reach_m = reach_m.fold(0.0, f64::max);
-    let from_middle_m = shots.iter().map(|shot| {
+    let from_middle_m = |shot: &SurfaceShot| {
         let from_m = (shot.ground_m - middle).norm();
         if shot.profile != profile && from_m.is_finite() {
             from_m
         } else {
             f64::INFINITY
         }
-    });
-    let from_middle_m: Vec<f64> = from_middle_m.collect();
-    let far_m = if from_middle_m.len() > PREDICTING {
-        let mut sizes_m = from_middle_m.clone();
+    };
+    let far_m = if shots.len() > PREDICTING {
+        let mut sizes_m: Vec<f64> = shots.iter().map(from_middle_m).collect();
         let (_, of_last, _) = sizes_m.select_nth_unstable_by(PREDICTING, f64::total_cmp);
         (*of_last + reach_m + ROUNDING_M).min(f64::MAX)
     } else {
         f64::MAX
     };
-    let near = from_middle_m.iter().enumerate();
-    near.filter(|(_, from_m)| **from_m <= far_m)
+    let near = shots.iter().map(from_middle_m).enumerate();
+    near.filter(|(_, from_m)| *from_m <= far_m)
         .map(|(index, _)| index)
         .collect()
 }

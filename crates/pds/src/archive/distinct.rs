@@ -141,9 +141,13 @@ impl Seen {
     /// 0, and that file.
     ///
     /// * `tags_s` – their time tags, ET seconds
-    pub fn take_all(&mut self, file: usize, tags_s: &[f64]) -> Option<(usize, usize)> {
-        let mut rows = tags_s.iter().enumerate();
-        rows.find_map(|(row, tag_s)| Some((row, self.take(file, *tag_s)?)))
+    pub fn take_all(
+        &mut self,
+        file: usize,
+        tags_s: impl IntoIterator<Item = f64>,
+    ) -> Option<(usize, usize)> {
+        let mut rows = tags_s.into_iter().enumerate();
+        rows.find_map(|(row, tag_s)| Some((row, self.take(file, tag_s)?)))
     }
 }
 
@@ -174,7 +178,7 @@ mod tests {
             let mut files = 0..case.files.len();
             let mut seen = Seen::default();
             let shared = files.find_map(|file| {
-                let (_, other) = seen.take_all(file, &case.tags_s(file))?;
+                let (_, other) = seen.take_all(file, case.tags_s(file))?;
                 Some([other, file])
             });
             assert_eq!(shared, case.shared, "{}: by shot", case.name);

@@ -20,7 +20,7 @@ const PIECES_MAX: usize = 256;
 /// Records of a task: 0.4 MB, and at most 1.5 MB of shots.
 const TASK_RECORDS: usize = 512;
 /// Tasks per thread in a wave, and the maximum of a wave: their results are in memory at once.
-const TASKS_PER_THREAD: usize = 16;
+const TASKS_PER_THREAD: usize = 8;
 const TASKS_MAX: usize = 64;
 
 /// Unusable records: more than this number and more than `UNUSABLE_SHARE_MAX` of a file indicate a damaged file rather

@@ -150,7 +150,7 @@ fn lidar_points<'a>(
         Some(LidarPoint {
             id: &point.id,
             // A time bias of the image is folded into its adjusted kernels.
-            et: Et::from_seconds(site.footprints.et_s[point.index] - time_bias_s),
+            et: Et::from_seconds(site.footprints.et_s.at(point.index) - time_bias_s),
             range_m: range.range_m,
             range_sigma_m: config.range_sigma_m,
             apriori: estimate(
@@ -173,11 +173,11 @@ fn lidar_points<'a>(
 fn places(image: &ImageProducts) -> BTreeMap<usize, [f64; 2]> {
     let points = &image.registration.points;
     (0..points.len())
-        .filter(|index| points.inside[*index])
+        .filter(|index| points.inside.at(*index))
         .map(|index| {
             (
-                points.row[index] as usize,
-                [points.line[index], points.sample[index]],
+                points.row.at(index) as usize,
+                [points.line.at(index), points.sample.at(index)],
             )
         })
         .collect()

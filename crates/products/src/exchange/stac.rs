@@ -53,9 +53,9 @@ pub(crate) static ITEM: Declaration = Declaration {
 /// A product that cannot be read; a time that is not ISO 8601.
 fn item(of: &Context) -> Result<Option<Value>> {
     let site = of.site;
-    let mut points = points_deg(site);
-    points.extend(outlines_deg(site));
-    let Some(bounds) = bounding_box_deg(&points).map(with_margin) else {
+    let outlines = outlines_deg(site);
+    let points = points_deg(site).chain(outlines.iter().copied());
+    let Some(bounds) = bounding_box_deg(points).map(with_margin) else {
         return Ok(None);
     };
     let Some([start, end]) = period(site)? else {
@@ -220,7 +220,7 @@ mod tests {
 
     #[test]
     fn boxes_across_the_antimeridian_are_cut_there() {
-        let bounds = bounding_box_deg(&[[179.5, 1.0], [-179.0, 3.0]]).map(with_margin);
+        let bounds = bounding_box_deg([[179.5, 1.0], [-179.0, 3.0]].into_iter()).map(with_margin);
         let cut = outline(bounds.unwrap());
         assert_eq!(cut["type"], "MultiPolygon");
         let corner =

@@ -51,10 +51,13 @@ fn places(registration: &ImageRegistration) -> BTreeMap<(u32, u32), ([f64; 2], b
     let points: &RegisteredPoints = &registration.points;
     let all = 0..points.len();
     all.map(|at| {
-        let key = (points.profile[at], points.row[at]);
+        let key = (points.profile.at(at), points.row.at(at));
         (
             key,
-            ([points.line[at], points.sample[at]], points.inside[at]),
+            (
+                [points.line.at(at), points.sample.at(at)],
+                points.inside.at(at),
+            ),
         )
     })
     .collect()

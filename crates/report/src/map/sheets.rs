@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 
 use super::super::outlines::{Outline, images, windows};
+use areograph_base::column::Column;
 use areograph_geom::ellipsoid::spherical_to_xyz_m;
 use areograph_products::SiteProducts;
 
@@ -14,7 +15,7 @@ pub(super) struct Shown {
     pub(super) windows: Vec<Outline>,
     pub(super) images: Vec<Outline>,
     /// Rows of the footprints.
-    pub(super) rows: Vec<usize>,
+    pub(super) rows: Column<u32>,
 }
 
 /// A ring on the sphere: its middle as a direction, and the distance of its points from it, radians.
@@ -60,7 +61,7 @@ pub(super) fn sheets(site: &SiteProducts) -> Vec<Shown> {
         .map(|_| Shown {
             windows: Vec::new(),
             images: Vec::new(),
-            rows: Vec::new(),
+            rows: Column::new(),
         })
         .collect();
     for ring in rings {
@@ -80,7 +81,7 @@ pub(super) fn sheets(site: &SiteProducts) -> Vec<Shown> {
         let sheet = nearest.map_or(0, |(window, _)| sheet_of[window]);
         sheets[sheet].images.push(image);
     }
-    for (row, mask) in site.footprints.windows.iter().enumerate() {
+    for (row, mask) in (0..).zip(&site.footprints.windows) {
         let window = mask.trailing_zeros() as usize;
         let sheet = sheet_of.get(window).copied().unwrap_or_default();
         sheets[sheet].rows.push(row);

@@ -192,15 +192,15 @@ impl Shots {
             trend: Vec::new(),
         };
         for shot in first..first + site.ranges.profiles[index].measured() {
-            let row = all.row[shot] as usize;
-            let seconds = site.footprints.et_s[row] - start_s;
-            let residual = (seconds, all.range_minus_distance_m[shot]);
-            if all.outlier[shot] {
+            let row = all.row.at(shot) as usize;
+            let seconds = site.footprints.et_s.at(row) - start_s;
+            let residual = (seconds, all.range_minus_distance_m.at(shot));
+            if all.outlier.at(shot) {
                 shots.outliers.push(residual);
             } else {
                 shots.kept.push(residual);
             }
-            let angle_deg = site.footprints.off_nadir_rad[row] / RADIANS_PER_DEGREE;
+            let angle_deg = site.footprints.off_nadir_rad.at(row) / RADIANS_PER_DEGREE;
             shots.off_nadir_deg.push((seconds, angle_deg));
         }
         let ranges = &site.ranges.profiles[index];

@@ -164,9 +164,9 @@ pub fn prepare_adjustment<M: ExteriorOrientation>(
         let samples = -config.footprint_margin_px
             ..=f64::from(candidate.times.samples) + config.footprint_margin_px;
         let seen = (0..points.len()).filter(|index| {
-            !points.extrapolated[*index] && samples.contains(&points.sample[*index])
+            !points.extrapolated.at(*index) && samples.contains(&points.sample.at(*index))
         });
-        near.extend(seen.map(|index| points.row[index]));
+        near.extend(seen.map(|index| points.row.at(index)));
     }
     let images = candidates.iter();
     let images: Vec<_> = images
@@ -184,8 +184,8 @@ pub fn prepare_adjustment<M: ExteriorOrientation>(
                     profile: index,
                     row: *row,
                     ground: Position::new(spherical_to_xyz_m(
-                        footprints.longitude_rad[at],
-                        footprints.latitude_rad[at],
+                        footprints.longitude_rad.at(at),
+                        footprints.latitude_rad.at(at),
                         footprints.ground_radius_m(at),
                     )),
                     range,
@@ -214,7 +214,7 @@ fn ranges_of(
     row: u32,
     images: &[(&ImageTimes, &Orientation)],
 ) -> Vec<ShotRange> {
-    let instant = Et::from_seconds(footprints.et_s[row as usize]);
+    let instant = Et::from_seconds(footprints.et_s.at(row as usize));
     let times: Vec<&ImageTimes> = images.iter().map(|(times, _)| *times).collect();
     let ranges = exposed(&times, instant).into_iter().map(|image| {
         let (times, orientation) = images[image];
@@ -223,7 +223,7 @@ fn ranges_of(
             image,
             x_lines,
             to_laser_m: orientation.to_spacecraft_m(x_lines),
-            range_m: footprints.range_m[row as usize],
+            range_m: footprints.range_m.at(row as usize),
         }
     });
     ranges.collect()

@@ -23,6 +23,7 @@ use serde::{Deserialize, Serialize};
 use super::{convert_datum::Converted, group_profiles::Profile};
 use areograph_base::{
     altimetry::MolaClock,
+    column::Column,
     error::{Cause, Result},
     footprints::{Footprint, Footprints},
     frames::BodyFixed,
@@ -75,7 +76,7 @@ stage_inputs! {
 
 impl Stage for CheckRanges<'_> {
     const NAME: &'static str = "check_ranges";
-    const METHOD: u32 = 15;
+    const METHOD: u32 = 16;
     type Output = RangeCheck;
     stage_inputs!(fingerprint);
 
@@ -119,7 +120,7 @@ impl Stage for CheckRanges<'_> {
 }
 
 /// Profiles that are checked at once, for each thread.
-const PROFILES_OF_A_THREAD: usize = 8;
+const PROFILES_OF_A_THREAD: usize = 2;
 /// Seconds of trajectory beyond the reach of the scan of the clock bias.
 const TRAJECTORY_MARGIN_S: f64 = 0.5;
 /// The tabulated trajectory stays this close to the kernels, metres: a tenth of a PEDR centimetre.
@@ -340,13 +341,15 @@ fn check_profile(
         })?;
         shots.push(index, *row, &residuals);
     }
-    shots.outlier = outliers(&shots.range_minus_distance_m, limits.outlier_sigma);
-    let kept: Vec<Footprint> = (0..shots.len())
-        .filter(|shot| !shots.outlier[*shot])
-        .map(|shot| footprints.row(shots.row[shot] as usize))
+    let residuals_m: Vec<f64> = shots.range_minus_distance_m.iter().collect();
+    let is_outlier = outliers(&residuals_m, limits.outlier_sigma);
+    let kept: Vec<Footprint> = (profile.rows.iter().zip(&is_outlier))
+        .filter(|(_, is_outlier)| !**is_outlier)
+        .map(|(row, _)| footprints.row(*row as usize))
         .collect();
+    shots.outlier = is_outlier.into();
     let scan = BiasScan::of(&kept, trajectory, limits);
-    let mut ranges = statistics(profile, &shots, 0, scan, footprints);
+    let mut ranges = statistics(profile, &shots, scan, footprints);
     let explain = || orbit::cause(footprints, profile, trajectory, clock, limits.orbit_max_m);
     ranges.invalid_because = ranges
         .figures()
@@ -354,31 +357,29 @@ fn check_profile(
     Ok((shots, ranges))
 }
 
-/// Statistics of the profile whose shots begin at `first`, not judged yet.
+/// Statistics of the profile with these shots, not judged yet.
 fn statistics(
     profile: &Profile,
     shots: &ShotResiduals,
-    first: usize,
     scan: Option<BiasScan>,
     footprints: &Footprints<BodyFixed>,
 ) -> ProfileRanges {
-    let summary = |column: &[f64]| Summary::of(&column[first..]);
+    let summary = |column: &Column<f64>| Summary::of(&column.iter().collect::<Vec<_>>());
     // Shots of tables may have no spacecraft position; where the kernels are not finite, range − distance is not
     // either.
-    let of_own = |column: &[f64]| {
-        let known = column[first..].iter().copied().filter(|of| !of.is_nan());
+    let of_own = |column: &Column<f64>| {
+        let known = column.iter().filter(|of| !of.is_nan());
         Summary::of(&known.collect::<Vec<_>>())
     };
-    let seconds: Vec<f64> = shots.row[first..]
-        .iter()
-        .map(|row| Et::from_seconds(footprints.et_s[*row as usize]).since(profile.interval.start))
-        .collect();
-    let outlier = &shots.outlier[first..];
-    let outliers = outlier.iter().filter(|flag| **flag).count();
+    let start = profile.interval.start;
+    let since_s = |row: u32| Et::from_seconds(footprints.et_s.at(row as usize)).since(start);
+    let seconds: Vec<f64> = shots.row.iter().map(since_s).collect();
+    let residuals_m: Vec<f64> = shots.range_minus_distance_m.iter().collect();
+    let outliers = shots.outlier.iter().filter(|flag| *flag).count();
     // A single wrong record must not decide the verdict on all others; their number has a separate limit.
-    let mean_without = |column: &[f64]| {
-        let kept = column[first..].iter().zip(outlier);
-        let kept: Vec<f64> = kept.filter(|(_, is)| !**is).map(|(m, _)| *m).collect();
+    let mean_without = |column: &Column<f64>| {
+        let kept = column.iter().zip(&shots.outlier);
+        let kept: Vec<f64> = kept.filter(|(_, is)| !is).map(|(m, _)| m).collect();
         Summary::of(&kept).mean
     };
     ProfileRanges {
@@ -395,7 +396,7 @@ fn statistics(
         ],
         mean_without_outliers_m: mean_without(&shots.range_minus_distance_m),
         decoding_without_outliers_m: mean_without(&shots.decoding_m),
-        trend_m_s: Trend::of(&seconds, &shots.range_minus_distance_m[first..]),
+        trend_m_s: Trend::of(&seconds, &residuals_m),
         outliers: u32::try_from(outliers).unwrap_or(u32::MAX),
         scan,
         invalid_because: Vec::new(),

@@ -2,38 +2,30 @@
 
 use serde::{Deserialize, Serialize};
 
+use areograph_base::column::Column;
 use areograph_geom::range_residuals::RangeResiduals;
 
 /// Residuals as columns, one entry per shot of a profile, metres.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct ShotResiduals {
     /// Index of the profile.
-    #[serde(with = "areograph_base::packed")]
-    pub profile: Vec<u32>,
+    pub profile: Column<u32>,
     /// Row of the footprint.
-    #[serde(with = "areograph_base::packed")]
-    pub row: Vec<u32>,
+    pub row: Column<u32>,
     /// Range − |SPK spacecraft − raw footprint|.
-    #[serde(with = "areograph_base::packed")]
-    pub range_minus_distance_m: Vec<f64>,
+    pub range_minus_distance_m: Column<f64>,
     /// Range − |SPK spacecraft − crossover-corrected footprint|.
-    #[serde(with = "areograph_base::packed")]
-    pub range_minus_distance_crossover_m: Vec<f64>,
+    pub range_minus_distance_crossover_m: Column<f64>,
     /// Range − |PEDR spacecraft − raw footprint|; NaN, as below, for shots of tables without a spacecraft.
-    #[serde(with = "areograph_base::packed")]
-    pub decoding_m: Vec<f64>,
+    pub decoding_m: Column<f64>,
     /// PEDR spacecraft − SPK spacecraft, away from Mars.
-    #[serde(with = "areograph_base::packed")]
-    pub spacecraft_radial_m: Vec<f64>,
+    pub spacecraft_radial_m: Column<f64>,
     /// PEDR spacecraft − SPK spacecraft, along the flight.
-    #[serde(with = "areograph_base::packed")]
-    pub spacecraft_along_m: Vec<f64>,
+    pub spacecraft_along_m: Column<f64>,
     /// PEDR spacecraft − SPK spacecraft, along the orbit's angular momentum.
-    #[serde(with = "areograph_base::packed")]
-    pub spacecraft_cross_m: Vec<f64>,
+    pub spacecraft_cross_m: Column<f64>,
     /// Whether range − distance is an outlier of its profile.
-    #[serde(with = "areograph_base::packed")]
-    pub outlier: Vec<bool>,
+    pub outlier: Column<bool>,
 }
 
 impl ShotResiduals {
@@ -50,28 +42,21 @@ impl ShotResiduals {
     }
 
     /// Appends the shots of another profile.
-    pub(super) fn append(&mut self, other: Self) {
-        let Self {
-            profile,
-            row,
-            range_minus_distance_m,
-            range_minus_distance_crossover_m,
-            decoding_m,
-            spacecraft_radial_m,
-            spacecraft_along_m,
-            spacecraft_cross_m,
-            outlier,
-        } = other;
-        self.profile.extend(profile);
-        self.row.extend(row);
-        self.range_minus_distance_m.extend(range_minus_distance_m);
+    pub(super) fn append(&mut self, mut other: Self) {
+        self.profile.append(&mut other.profile);
+        self.row.append(&mut other.row);
+        self.range_minus_distance_m
+            .append(&mut other.range_minus_distance_m);
         self.range_minus_distance_crossover_m
-            .extend(range_minus_distance_crossover_m);
-        self.decoding_m.extend(decoding_m);
-        self.spacecraft_radial_m.extend(spacecraft_radial_m);
-        self.spacecraft_along_m.extend(spacecraft_along_m);
-        self.spacecraft_cross_m.extend(spacecraft_cross_m);
-        self.outlier.extend(outlier);
+            .append(&mut other.range_minus_distance_crossover_m);
+        self.decoding_m.append(&mut other.decoding_m);
+        self.spacecraft_radial_m
+            .append(&mut other.spacecraft_radial_m);
+        self.spacecraft_along_m
+            .append(&mut other.spacecraft_along_m);
+        self.spacecraft_cross_m
+            .append(&mut other.spacecraft_cross_m);
+        self.outlier.append(&mut other.outlier);
     }
 
     pub(super) fn push(&mut self, profile: u32, row: u32, residuals: &RangeResiduals) {

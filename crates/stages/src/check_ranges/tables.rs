@@ -58,7 +58,7 @@ stage_inputs! {
 
 impl Stage for CheckTableRanges<'_> {
     const NAME: &'static str = "check_ranges";
-    const METHOD: u32 = 7;
+    const METHOD: u32 = 8;
     type Output = RangeCheck;
     stage_inputs!(fingerprint);
 
@@ -133,7 +133,7 @@ pub fn check_table_ranges(
     let mut checked = Vec::with_capacity(profiles.len());
     for (index, profile) in (0_u32..).zip(profiles) {
         Stopped::check(stop)?;
-        let first = shots.len();
+        let mut of_profile = ShotResiduals::default();
         for row in &profile.rows {
             let shot = footprints.row(*row as usize);
             let at = clock.spacecraft_time(shot.et_tag_s);
@@ -142,12 +142,13 @@ pub fn check_table_ranges(
                 if !states_spacecraft(footprints, *row as usize) {
                     residuals.forget_own();
                 }
-                shots.push(index, *row, &residuals);
+                of_profile.push(index, *row, &residuals);
             }
         }
-        let flags = outliers(&shots.range_minus_distance_m[first..], limits.outlier_sigma);
-        shots.outlier.extend(flags);
-        let mut ranges = statistics(profile, &shots, first, None, footprints);
+        let residuals_m: Vec<f64> = of_profile.range_minus_distance_m.iter().collect();
+        of_profile.outlier = outliers(&residuals_m, limits.outlier_sigma).into();
+        let mut ranges = statistics(profile, &of_profile, None, footprints);
+        shots.append(of_profile);
         by_own_spacecraft(&mut ranges, footprints, profile, limits);
         let explain = || {
             "the orbit in support data or kernels differs from the orbit in the table, or times or radii in the table \

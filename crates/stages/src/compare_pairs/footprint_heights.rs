@@ -58,8 +58,8 @@ pub(super) fn footprint_heights<M: ExteriorOrientation>(
         let ground_m = intersect(&rays, &limits).ok()?.ground_m;
         let at = *row as usize;
         let footprint_m = spherical_to_xyz_m(
-            footprints.longitude_rad[at],
-            footprints.latitude_rad[at],
+            footprints.longitude_rad.at(at),
+            footprints.latitude_rad.at(at),
             footprints.ground_radius_m(at),
         );
         Some(FootprintHeight {

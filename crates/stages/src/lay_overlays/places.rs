@@ -150,9 +150,14 @@ type Inside = BTreeMap<(u32, u32), f64>;
 
 fn inside(registration: &ImageRegistration) -> Inside {
     let points = &registration.points;
-    let inside = (0..points.len()).filter(|at| points.inside[*at]);
+    let inside = (0..points.len()).filter(|at| points.inside.at(*at));
     inside
-        .map(|at| ((points.profile[at], points.row[at]), points.line[at]))
+        .map(|at| {
+            (
+                (points.profile.at(at), points.row.at(at)),
+                points.line.at(at),
+            )
+        })
         .collect()
 }
 
@@ -169,9 +174,9 @@ fn spread(rows: &Inside) -> Vec<(u32, u32)> {
 fn ground_m(footprints: &Footprints<BodyFixed>, row: u32) -> Vector3<f64> {
     let row = row as usize;
     spherical_to_xyz_m(
-        footprints.longitude_rad[row],
-        footprints.latitude_rad[row],
-        footprints.radius_m[row],
+        footprints.longitude_rad.at(row),
+        footprints.latitude_rad.at(row),
+        footprints.radius_m.at(row),
     )
 }
 

@@ -34,7 +34,10 @@ pub(super) fn compare(
         let first = shots.len();
         for row in &profile.rows {
             let at = *row as usize;
-            let place_rad = [footprints.longitude_rad[at], footprints.latitude_rad[at]];
+            let place_rad = [
+                footprints.longitude_rad.at(at),
+                footprints.latitude_rad.at(at),
+            ];
             let found = on_model(model, place_rad, footprints.ground_radius_m(at), options);
             shots.extend(found.map(|(above_m, sigma_m)| ShotOnSurface {
                 profile: index,

@@ -175,17 +175,20 @@ pub fn register<'a>(
 ) -> Result<ImageRegistration> {
     let watch = watch.into();
     let camera = OrientedImage::of(image, orientation, model)?;
-    let shots: Vec<(u32, u32)> = (0_u32..)
+    let mut shots = (0_u32..)
         .zip(profiles)
-        .flat_map(|(profile, of)| of.rows.iter().map(move |row| (profile, *row)))
-        .collect();
+        .flat_map(|(profile, of)| of.rows.iter().map(move |row| (profile, *row)));
     let projector = camera.projector();
     let isis = IsisImage::of(image, orientation)?;
     let isis_projector = isis.projector();
     let mut points = RegisteredPoints::default();
     let mut rejected = BTreeMap::new();
-    watch.announce(shots.len());
-    for block in shots.chunks(POINTS_AT_ONCE) {
+    watch.announce(profiles.iter().map(|profile| profile.rows.len()).sum());
+    loop {
+        let block: Vec<(u32, u32)> = shots.by_ref().take(POINTS_AT_ONCE).collect();
+        if block.is_empty() {
+            break;
+        }
         watch.check()?;
         let placed: Vec<_> = block
             .par_iter()
@@ -214,7 +217,7 @@ pub fn register<'a>(
     let on_lines = points.on_lines();
     let ground: Vec<Vector3<f64>> = on_lines
         .iter()
-        .map(|index| ground_m(footprints, points.row[*index]))
+        .map(|index| ground_m(footprints, points.row.at(*index)))
         .collect();
     let methods = methods::run(&camera, &ground, config, watch)?;
     points.count(Method::FrameFirst, &on_lines, &methods);
@@ -234,8 +237,8 @@ pub fn register<'a>(
 fn ground_m(footprints: &Footprints<BodyFixed>, row: u32) -> Vector3<f64> {
     let row = row as usize;
     spherical_to_xyz_m(
-        footprints.longitude_rad[row],
-        footprints.latitude_rad[row],
+        footprints.longitude_rad.at(row),
+        footprints.latitude_rad.at(row),
         footprints.ground_radius_m(row),
     )
 }
@@ -293,8 +296,8 @@ impl OrientedImage<'_> {
                 .map(|(point_m, index)| {
                     let other = self.place(&projector, point_m).ok()?;
                     Some((
-                        other.line - points.line[*index],
-                        other.sample - points.sample[*index],
+                        other.line - points.line.at(*index),
+                        other.sample - points.sample.at(*index),
                     ))
                 })
                 .collect();

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::methods::{Method, MethodRun};
+use areograph_base::column::Column;
 use areograph_geom::pushbroom::CameraModel;
 
 macro_rules! columns {
@@ -15,19 +16,15 @@ macro_rules! columns {
         #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
         pub struct RegisteredPoints {
             /// Index of the profile.
-            #[serde(with = "areograph_base::packed")]
-            pub profile: Vec<u32>,
+            pub profile: Column<u32>,
             /// Row of the footprint.
-            #[serde(with = "areograph_base::packed")]
-            pub row: Vec<u32>,
-            $($(#[$doc])* #[serde(with = "areograph_base::packed")] pub $column: Vec<$kind>,)*
+            pub row: Column<u32>,
+            $($(#[$doc])* pub $column: Column<$kind>,)*
             /// Evaluations of the frame-first iteration with the second-order model; 0 where it was not
             /// tried (outside the image's lines) or does not converge.
-            #[serde(with = "areograph_base::packed")]
-            pub evaluations_frame_first: Vec<u32>,
+            pub evaluations_frame_first: Column<u32>,
             /// Evaluations of the fixed-point iteration, eq. 4 of Shan et al. 2005; 0 in the same cases.
-            #[serde(with = "areograph_base::packed")]
-            pub evaluations_fixed_point: Vec<u32>,
+            pub evaluations_fixed_point: Column<u32>,
         }
 
         impl RegisteredPoints {
@@ -97,14 +94,14 @@ impl RegisteredPoints {
     /// Points that the delivered image shows.
     #[must_use]
     pub fn inside_count(&self) -> usize {
-        self.inside.iter().filter(|inside| **inside).count()
+        self.inside.iter().filter(|inside| *inside).count()
     }
 
     /// Indices of the points within the image's lines.
     pub(super) fn on_lines(&self) -> Vec<usize> {
         let points = self.extrapolated.iter().enumerate();
         points
-            .filter(|(_, extrapolated)| !**extrapolated)
+            .filter(|(_, extrapolated)| !*extrapolated)
             .map(|(index, _)| index)
             .collect()
     }
@@ -123,9 +120,15 @@ impl RegisteredPoints {
         let run = runs
             .iter()
             .find(|(run, _)| run.method == method && run.model == CameraModel::SecondOrder);
-        for (index, evaluations) in on_lines.iter().zip(run.iter().flat_map(|(_, each)| each)) {
-            column[*index] = *evaluations;
-        }
+        let mut counted = on_lines.iter().zip(run.iter().flat_map(|(_, each)| each));
+        let mut next = counted.next();
+        *column = column.changed(|index, before| match next {
+            Some((at, evaluations)) if *at == index => {
+                next = counted.next();
+                *evaluations
+            }
+            _ => before,
+        });
     }
 }
 
@@ -134,15 +137,15 @@ pub(super) fn on_image(points: &RegisteredPoints, count: usize) -> Vec<ProfileOn
     let mut profiles = vec![ProfileOnImage::default(); count];
     let mut spacings: Vec<Vec<f64>> = vec![Vec::new(); count];
     for index in 0..points.len() {
-        let profile = points.profile[index] as usize;
+        let profile = points.profile.at(index) as usize;
         profiles[profile].points += 1;
-        profiles[profile].inside += u32::from(points.inside[index]);
+        profiles[profile].inside += u32::from(points.inside.at(index));
         let follows = index > 0
-            && points.profile[index - 1] == points.profile[index]
-            && !points.extrapolated[index - 1]
-            && !points.extrapolated[index];
+            && points.profile.at(index - 1) == points.profile.at(index)
+            && !points.extrapolated.at(index - 1)
+            && !points.extrapolated.at(index);
         if follows {
-            spacings[profile].push((points.line[index] - points.line[index - 1]).abs());
+            spacings[profile].push((points.line.at(index) - points.line.at(index - 1)).abs());
         }
     }
     for (profile, spacings) in profiles.iter_mut().zip(&mut spacings) {

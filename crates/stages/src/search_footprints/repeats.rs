@@ -34,25 +34,26 @@ pub(super) fn require_distinct(footprints: &Footprints<AsRead>, paths: &[PathBuf
     let (tags_s, files) = (&footprints.et_tag_s, &footprints.file);
     let mut seen = Seen::default();
     let shared: Vec<(usize, usize)> = (0..footprints.len())
-        .filter_map(|row| Some((row, seen.take(usize::from(files[row]), tags_s[row])?)))
+        .filter_map(|row| Some((row, seen.take(usize::from(files.at(row)), tags_s.at(row))?)))
         .collect();
-    let earliest = (shared.iter()).min_by(|(a, _), (b, _)| tags_s[*a].total_cmp(&tags_s[*b]));
+    let earliest = (shared.iter()).min_by(|(a, _), (b, _)| tags_s.at(*a).total_cmp(&tags_s.at(*b)));
     let Some((row, other)) = earliest.copied() else {
         return Ok(());
     };
-    let is_of_both = |(of, with): &&(usize, usize)| files[*of] == files[row] && *with == other;
-    let apart_s = |of: &usize| (tags_s[*of] - tags_s[row]).abs();
-    let others = (0..footprints.len()).filter(|of| usize::from(files[*of]) == other);
+    let is_of_both =
+        |(of, with): &&(usize, usize)| files.at(*of) == files.at(row) && *with == other;
+    let apart_s = |of: &usize| (tags_s.at(*of) - tags_s.at(row)).abs();
+    let others = (0..footprints.len()).filter(|of| usize::from(files.at(*of)) == other);
     let other_row = others.min_by(|a, b| apart_s(a).total_cmp(&apart_s(b)));
     let error = SharedShots {
         shots: shared.iter().filter(is_of_both).count(),
         other: paths[other].display().to_string(),
-        record: footprints.record[row],
-        other_record: footprints.record[other_row.unwrap_or(row)],
-        orbit: footprints.orbit[row],
-        at: Et::from_seconds(tags_s[row]),
+        record: footprints.record.at(row),
+        other_record: footprints.record.at(other_row.unwrap_or(row)),
+        orbit: footprints.orbit.at(row),
+        at: Et::from_seconds(tags_s.at(row)),
     };
-    Err(Error::from(error).in_file(&paths[usize::from(files[row])]))
+    Err(Error::from(error).in_file(&paths[usize::from(files.at(row))]))
 }
 
 #[cfg(test)]

@@ -43,8 +43,8 @@ impl MolaShots {
         let ground_m = |row: u32| {
             let at = row as usize;
             spherical_to_xyz_m(
-                footprints.longitude_rad[at],
-                footprints.latitude_rad[at],
+                footprints.longitude_rad.at(at),
+                footprints.latitude_rad.at(at),
                 footprints.ground_radius_m(at),
             )
         };
@@ -95,22 +95,25 @@ impl MolaShots {
     fn all(footprints: &Footprints<BodyFixed>, profiles: &[Profile]) -> Vec<SurfaceShot> {
         let mut is_used = vec![false; footprints.len()];
         let mut used = Vec::new();
-        for (index, profile) in profiles.iter().enumerate() {
-            for at in profile.rows.iter().map(|row| *row as usize) {
-                if !std::mem::replace(&mut is_used[at], true) {
-                    used.push((index, at));
+        for (index, profile) in (0_u32..).zip(profiles) {
+            for row in profile.rows.iter().copied() {
+                if !std::mem::replace(&mut is_used[row as usize], true) {
+                    used.push((index, row));
                 }
             }
         }
-        let shot = |(profile, at): (usize, usize)| SurfaceShot {
-            ground_m: spherical_to_xyz_m(
-                footprints.longitude_rad[at],
-                footprints.latitude_rad[at],
-                footprints.ground_radius_m(at),
-            ),
-            profile,
-            attitude_known: footprints.attitude_flag[at] < NO_ATTITUDE,
-            off_nadir_rad: footprints.off_nadir_rad[at],
+        let shot = |(profile, row): (u32, u32)| {
+            let at = row as usize;
+            SurfaceShot {
+                ground_m: spherical_to_xyz_m(
+                    footprints.longitude_rad.at(at),
+                    footprints.latitude_rad.at(at),
+                    footprints.ground_radius_m(at),
+                ),
+                profile: profile as usize,
+                attitude_known: footprints.attitude_flag.at(at) < NO_ATTITUDE,
+                off_nadir_rad: footprints.off_nadir_rad.at(at),
+            }
         };
         used.into_par_iter().map(shot).collect()
     }

@@ -37,7 +37,10 @@ impl Heights {
         let rows = profiles.iter().flat_map(|profile| &profile.rows);
         let shots = rows.map(|row| {
             let at = *row as usize;
-            let (longitude, latitude) = (footprints.longitude_rad[at], footprints.latitude_rad[at]);
+            let (longitude, latitude) = (
+                footprints.longitude_rad.at(at),
+                footprints.latitude_rad.at(at),
+            );
             spherical_to_xyz_m(longitude, latitude, footprints.ground_radius_m(at))
         });
         Self::at(footprints.body, shots.collect())

@@ -7,7 +7,7 @@ use std::{
     collections::BTreeMap,
     fmt::Display,
     fs::File,
-    io::{self, BufWriter, Read as _, Seek as _, SeekFrom, Write},
+    io::{BufWriter, Read as _, Seek as _, SeekFrom, Write},
     path::{Path, PathBuf},
     sync::{Arc, OnceLock},
 };
@@ -15,14 +15,16 @@ use std::{
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use super::{Book, Entered, Entry};
-use crate::stage::{Output, Round};
+use crate::{
+    hashed::{HASHED_AT_ONCE, Hashed},
+    stage::{Output, Round},
+};
 use areograph_base::{
+    column::require_kept,
     error::{Cause, Error, IoError, Locate as _, Result},
     stored::whole,
 };
 
-/// Bytes that are hashed at once.
-const PIECE_BYTES: usize = 1 << 17;
 /// Bytes of the length of the table of contents.
 const TAIL_BYTES: u64 = 8;
 
@@ -84,15 +86,16 @@ impl Book {
     /// Errors of `to`; an output that is not known or cannot be stored.
     pub fn write(&self, layout: &str, to: impl Write) -> Result<blake3::Hash> {
         // Numbers are encoded one by one, and hashed in pieces.
-        let mut to = BufWriter::with_capacity(PIECE_BYTES, Hashed::new(to));
+        let mut to = BufWriter::with_capacity(HASHED_AT_ONCE, Hashed::new(to));
         let written = self.write_all(layout, &mut to);
         let flushed = to.flush();
         if let Some(refusal) = to.get_mut().refusal.take() {
             return Err(IoError::on("write")(refusal).into());
         }
         written?;
+        require_kept()?;
         flushed.map_err(IoError::on("write"))?;
-        Ok(to.get_ref().hash.finalize())
+        Ok(to.get_ref().hash())
     }
 
     fn write_all(&self, layout: &str, to: &mut BufWriter<Hashed<impl Write>>) -> Result<()> {
@@ -229,46 +232,4 @@ fn encode(
     whole(|| postcard::to_io(value, to))
         .map(|_| ())
         .map_err(|source| BookError::Unstorable { name, source }.into())
-}
-
-/// A writer that hashes its data, and keeps the reason of an error, which postcard discards.
-struct Hashed<W> {
-    to: W,
-    hash: blake3::Hasher,
-    bytes: u64,
-    refusal: Option<io::Error>,
-}
-
-impl<W: Write> Hashed<W> {
-    fn new(to: W) -> Self {
-        Self {
-            to,
-            hash: blake3::Hasher::new(),
-            bytes: 0,
-            refusal: None,
-        }
-    }
-}
-
-impl<W: Write> Write for Hashed<W> {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        match self.to.write(bytes) {
-            Ok(count) => {
-                self.hash.update(&bytes[..count]);
-                self.bytes += count as u64;
-                Ok(count)
-            }
-            // Is tried again.
-            Err(refusal) if refusal.kind() == io::ErrorKind::Interrupted => Err(refusal),
-            Err(refusal) => {
-                let kind = refusal.kind();
-                self.refusal = Some(refusal);
-                Err(kind.into())
-            }
-        }
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.to.flush()
-    }
 }
