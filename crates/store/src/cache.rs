@@ -353,7 +353,7 @@ mod tests {
         let zeros = |kept: usize| [&whole[..kept], &vec![0; whole.len() - kept]].concat();
         let left = [Vec::new(), whole[..half].to_vec(), zeros(half), zeros(0)];
         for bytes in left {
-            fs::write(&path, &bytes).unwrap();
+            atomic::write(&path, &bytes).unwrap();
             // Read at once, and on demand.
             let on_demand = StageCache::new(folder.path(), false).knowing(InputFiles::default());
             for cache in [&cache, &on_demand] {
