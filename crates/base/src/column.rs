@@ -240,19 +240,15 @@ impl<T: Packed> Serialize for Column<T> {
     }
 }
 
-/// Every piece is unpacked once to verify it, and stays packed.
+/// Every piece is unpacked once to verify it; pieces of [`PIECE`] values stay packed, and others are packed anew.
 impl<'de, T: Packed> Deserialize<'de> for Column<T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let damaged = || de::Error::custom(packed::DAMAGED);
         let bytes = deserializer.deserialize_bytes(packed::Bytes)?;
         let (count, pieces) = packed::split(&bytes).ok_or_else(damaged)?;
-        let full = count / PIECE;
-        let read = pieces.par_iter().enumerate().map(|(index, bytes)| {
+        let part = |bytes: &&[u8]| {
             let values: Vec<T> = packed::values(bytes)?;
-            let is_full = index < full;
-            let expected = if is_full { PIECE } else { count % PIECE };
-            (values.len() == expected).then_some(())?;
-            Some(if is_full {
+            Some(if values.len() == PIECE {
                 Self {
                     pieces: vec![Arc::new(Kept::new(bytes.to_vec()))],
                     rest: Vec::new(),
@@ -263,12 +259,15 @@ impl<'de, T: Packed> Deserialize<'de> for Column<T> {
                     rest: values,
                 }
             })
-        });
-        let read: Option<Vec<Self>> = read.collect();
+        };
+        let parts: Option<Vec<Self>> = pieces.par_iter().map(part).collect();
         let mut column = Self::new();
-        for part in read.ok_or_else(damaged)? {
-            column.pieces.extend(part.pieces);
-            column.rest.extend(part.rest);
+        for mut part in parts.ok_or_else(damaged)? {
+            if column.rest.is_empty() && part.rest.is_empty() {
+                column.pieces.append(&mut part.pieces);
+            } else {
+                column.append(&mut part);
+            }
         }
         (column.len() == count)
             .then_some(column)
@@ -381,7 +380,14 @@ mod tests {
             let cut: Result<Column<f64>, _> = postcard::from_bytes(&bytes[..bytes.len() - 1]);
             assert!(cut.is_err(), "{count}");
         }
-        // A column of a vector has longer pieces; and a count of one value more.
+        // Longer pieces are packed anew.
+        #[derive(Serialize)]
+        struct Long(#[serde(with = "crate::packed")] Vec<f64>);
+        let values = numbers(9 * PIECE + 5);
+        let bytes = postcard::to_stdvec(&Long(values.clone())).unwrap();
+        let found: Column<f64> = postcard::from_bytes(&bytes).unwrap();
+        assert!(found == Column::from(values));
+        // The count states one value more than is stored.
         let bytes = postcard::to_stdvec(&Column::from(numbers(2 * PIECE))).unwrap();
         let place = (0..bytes.len())
             .find(|at| bytes[*at..].starts_with(&(2 * PIECE as u64).to_le_bytes()))

@@ -192,7 +192,9 @@ fn ranked<I: Iterator<Item = f64>>(mut rank: usize, values: &impl Fn() -> I) -> 
             .map(ordered)
             .filter(|bits| above(*bits) == above(found))
         {
-            counts[(bits >> shift) as usize % (1 << DIGIT_BITS)] += 1;
+            #[allow(clippy::cast_possible_truncation, reason = "a digit has sixteen bits")]
+            let digit = (bits >> shift) as u16;
+            counts[usize::from(digit)] += 1;
         }
         let mut digit = 0;
         while digit + 1 < counts.len() && rank >= counts[digit] {

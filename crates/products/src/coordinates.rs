@@ -50,9 +50,10 @@ pub(super) fn bounding_box_deg(points: impl Iterator<Item = [f64; 2]> + Clone) -
     } else {
         west + 360.0 - east
     };
-    let latitudes = || points.clone().map(|point| point[1]);
-    let south = latitudes().fold(f64::INFINITY, f64::min);
-    let north = latitudes().fold(f64::NEG_INFINITY, f64::max);
+    let nothing = (f64::INFINITY, f64::NEG_INFINITY);
+    let (south, north) = points.fold(nothing, |(south, north), point| {
+        (south.min(point[1]), north.max(point[1]))
+    });
     let surrounded = widest < 180.0;
     Some(if surrounded && south > POLAR_DEG {
         [-180.0, south, 180.0, 90.0]
@@ -72,6 +73,11 @@ const CELLS: usize = 1 << 16;
 fn ends_of_cells(longitudes: impl Iterator<Item = f64>) -> impl Iterator<Item = f64> {
     let mut cells = vec![[f64::INFINITY, f64::NEG_INFINITY]; CELLS];
     for east_deg in longitudes {
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "longitudes begin at -180 degrees, and the last cell is the largest"
+        )]
         let cell = ((east_deg + 180.0) / CELL_DEG) as usize;
         let ends = &mut cells[cell.min(CELLS - 1)];
         *ends = [ends[0].min(east_deg), ends[1].max(east_deg)];

@@ -34,7 +34,7 @@ pub struct ShotTimes(pub Column<Utc>);
 
 impl Stage for TagUtc<'_> {
     const NAME: &'static str = "tag_utc";
-    const METHOD: u32 = 5;
+    const METHOD: u32 = 4;
     type Output = ShotTimes;
     stage_inputs!(fingerprint);
 

@@ -16,7 +16,10 @@ use crate::{
     product::{Content, Context, Declaration, Program, Role, Use, Write},
     site::SiteProducts,
 };
-use areograph_base::error::{Locate, Result};
+use areograph_base::{
+    error::{Locate, Result},
+    utc::Utc,
+};
 use areograph_store::files::hash_file;
 
 const EXTENSIONS: [&str; 3] = [
@@ -162,7 +165,7 @@ fn period(site: &SiteProducts) -> Result<Option<[String; 2]>> {
         .min()
         .into_iter()
         .chain(site.utc.iter().max());
-    let mut instants: Vec<NaiveDateTime> = shots.map(|utc| utc.calendar()).collect();
+    let mut instants: Vec<NaiveDateTime> = shots.map(Utc::calendar).collect();
     for image in site.images {
         let start = instant(&image.times.utc_start)?;
         #[allow(

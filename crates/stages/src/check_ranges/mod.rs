@@ -76,7 +76,7 @@ stage_inputs! {
 
 impl Stage for CheckRanges<'_> {
     const NAME: &'static str = "check_ranges";
-    const METHOD: u32 = 16;
+    const METHOD: u32 = 15;
     type Output = RangeCheck;
     stage_inputs!(fingerprint);
 

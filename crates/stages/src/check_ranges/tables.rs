@@ -58,7 +58,7 @@ stage_inputs! {
 
 impl Stage for CheckTableRanges<'_> {
     const NAME: &'static str = "check_ranges";
-    const METHOD: u32 = 8;
+    const METHOD: u32 = 7;
     type Output = RangeCheck;
     stage_inputs!(fingerprint);
 
