@@ -30,8 +30,12 @@ pub(super) fn over_squares<const N: usize>(
     let beyond = HALF - (per_cell - 1) / 2;
     let (whole, single) = (beyond / per_cell, beyond % per_cell);
     let of_lines = |lines: &mut dyn Iterator<Item = usize>, sums: &mut Lines<N>| {
-        sums.iter_mut().for_each(|of| of.fill(0.0));
-        lines.for_each(|line| add(line, sums));
+        for of in sums.iter_mut() {
+            of.fill(0.0);
+        }
+        for line in lines {
+            add(line, sums);
+        }
     };
     let lines = || -> Lines<N> { std::array::from_fn(|_| vec![0.0; width]) };
     let mut of_cells: Vec<Lines<N>> = (0..=2 * whole).map(|_| lines()).collect();

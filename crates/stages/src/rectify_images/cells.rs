@@ -133,6 +133,10 @@ impl Cells {
         Ok(all)
     }
 
+    #[allow(
+        clippy::cast_possible_truncation,
+        reason = "the edges are near the few pixels of a tile, or far from all of them"
+    )]
     fn of_tile(
         &self,
         view: &View<'_>,
