@@ -389,7 +389,7 @@ fn shots_of_the_time_of_the_image_are_none_of_its_own() {
     let start_s = times.line_times.start().seconds();
     let mut shots = Footprints::<BodyFixed>::new(Vec::new());
     shots.et_s = (0..50).map(|shot| start_s + f64::from(shot)).collect();
-    (shots.orbit, shots.windows) = (vec![1; 50], vec![1; 50]);
+    (shots.orbit, shots.windows) = (vec![1; 50].into(), vec![1; 50].into());
     let window = window_of_box("window", [0.0, 1.0, 0.0, 1.0]).unwrap();
     let beside = |times: &ImageTimes| {
         let profiles = group_profiles(&shots, slice::from_ref(&window), slice::from_ref(times));

@@ -343,7 +343,8 @@ mod tests {
             };
             let mut checked = files.map(|file| {
                 let tags_s = case.tags_s(file);
-                hand_on.require_distinct(file, &tags_s, &vec![1; tags_s.len()])
+                let records = vec![1; tags_s.len()].into();
+                hand_on.require_distinct(file, &tags_s.into(), &records)
             });
             let refused = checked.find_map(Result::err);
             let named = refused.map(|error| (error.file.clone(), error.cause.to_string()));
