@@ -366,6 +366,10 @@ mod tests {
         }
     }
 
+    /// Stored in pieces of another length.
+    #[derive(Serialize)]
+    struct Long(#[serde(with = "crate::packed")] Vec<f64>);
+
     #[test]
     fn stored_columns_come_back_and_damaged_ones_are_refused() {
         for count in COUNTS {
@@ -381,8 +385,6 @@ mod tests {
             assert!(cut.is_err(), "{count}");
         }
         // Longer pieces are packed anew.
-        #[derive(Serialize)]
-        struct Long(#[serde(with = "crate::packed")] Vec<f64>);
         let values = numbers(9 * PIECE + 5);
         let bytes = postcard::to_stdvec(&Long(values.clone())).unwrap();
         let found: Column<f64> = postcard::from_bytes(&bytes).unwrap();

@@ -144,7 +144,9 @@ mod tests {
             sorted.sort_by(f64::total_cmp);
             let expected = widest_stretch(sorted.into_iter()).unwrap();
             let found = bounding_box_deg(longitudes.map(|east| [east, 0.0])).unwrap();
-            assert_eq!([found[0], found[2]], [expected[0], expected[1]], "{count}");
+            let bits = |of: [f64; 2]| of.map(f64::to_bits);
+            let found = [found[0], found[2]];
+            assert_eq!(bits(found), bits([expected[0], expected[1]]), "{count}");
         }
     }
 
