@@ -71,7 +71,7 @@ impl Input for ShotFiles<'_> {
 
 impl Stage for ReadShots<'_> {
     const NAME: &'static str = "search_footprints";
-    const METHOD: u32 = 7;
+    const METHOD: u32 = 8;
     const CHECKED: bool = true;
     type Output = SearchResult;
     stage_inputs!(fingerprint);

@@ -98,7 +98,7 @@ impl Input for KnownPlaces<'_> {
 
 impl Stage for SearchFootprints<'_> {
     const NAME: &'static str = STAGE;
-    const METHOD: u32 = 7;
+    const METHOD: u32 = 8;
     const CHECKED: bool = true;
     type Output = SearchResult;
     stage_inputs!(fingerprint);
