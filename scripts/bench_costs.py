@@ -1,7 +1,7 @@
 """What users wait for, by size: time, processor time, memory and bytes of whole commands, each over a decade of sizes.
 
 bench_costs.py PROGRAM FOLDER [--plot FILE.svg] [--terrain]: prints a table in Markdown. Every size is measured three times, and the
-median is printed; input files are in the page cache. Rows of Parquet and CSV are compared with PyArrow and Polars, which must be
+median is printed, except for first runs without changes; input files are in the page cache. Rows of Parquet and CSV are compared with PyArrow and Polars, which must be
 installed, as must matplotlib for the plot. With --terrain also two rendered images are matched, which takes minutes.
 """
 
@@ -37,8 +37,8 @@ def once(command):
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     _, status, used = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)
-    # 4: results that are not valid, such as those of copied tie points.
-    if process.returncode not in (0, 4):
+    # 5: results that are not valid, such as those of copied tie points.
+    if process.returncode not in (0, 5):
         raise SystemExit(f"bench: {' '.join(map(str, command))} ended with {process.returncode}")
     return Cost(time.monotonic() - began, used.ru_utime + used.ru_stime, used.ru_maxrss / 1024)
 

@@ -92,6 +92,8 @@ def main(program, archive, kernels):
         for row in found:
             shots, sum_m = by_orbit.get((row["file"], row["orbit"]), (0, 0.0))
             by_orbit[row["file"], row["orbit"]] = (shots + row["shots"], sum_m + row["shots"] * row["mean_m"])
+        if len(by_orbit) != len(theirs["name"]):
+            sys.exit(f"areograph checks {len(by_orbit)} profiles, the script {len(theirs['name'])}")
         largest_m, total = 0.0, 0
         for file, orbit, shots, mean_m in zip(theirs["name"], theirs["orbit"], theirs["shots"], theirs["mean_m"]):
             ours_shots, sum_m = by_orbit.get((str(file), int(orbit)), (0, 0.0))

@@ -32,6 +32,7 @@ mod worker;
 
 use std::{
     ffi::OsString,
+    panic::{AssertUnwindSafe, catch_unwind, resume_unwind},
     path::{Path, PathBuf},
     process::ExitCode,
 };
@@ -40,6 +41,7 @@ use clap::{ArgAction, Parser, Subcommand, ValueEnum};
 use tracing::level_filters::LevelFilter;
 
 use crate::{
+    column::lost_values,
     config::{Document, SiteConfig, check_sites},
     error::{Cause, Error, Locate as _},
 };
@@ -133,7 +135,11 @@ pub fn main() -> ExitCode {
 pub fn main_of(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> ExitCode {
     let cli = Cli::parse_from(arguments);
     log(&cli);
-    let code = run(cli.command);
+    let code = catch_unwind(AssertUnwindSafe(|| run(cli.command)));
+    let code = code.unwrap_or_else(|panic| match lost_values(&*panic) {
+        Some(lost) => report(&lost),
+        None => resume_unwind(panic),
+    });
     // A success with incomplete output is a failure.
     match output::complete() {
         Err(lost) if code == ExitCode::SUCCESS => report(&lost.into()),

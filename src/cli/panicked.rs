@@ -2,16 +2,25 @@
 
 use tokio::task::JoinError;
 
-use crate::error::{Cause, Result};
+use crate::{
+    column::lost_values,
+    error::{Cause, Result},
+};
 
 #[derive(Debug, thiserror::Error, Cause)]
 #[error("internal error of areograph: {0}")]
 #[cause(Bug: "please report it with the configuration; the next run detects and repairs incomplete products")]
 struct Panicked(String);
 
-/// The result of a task. One that panicked is a bug in areograph, reported like any other failure.
+/// The result of a task. One that panicked is a bug in areograph, reported like any other failure, unless it ended since
+/// values of a column were lost.
 pub(super) fn flatten<T>(joined: std::result::Result<Result<T>, JoinError>) -> Result<T> {
-    joined.unwrap_or_else(|error| Err(Panicked(error.to_string()).into()))
+    joined.unwrap_or_else(|error| {
+        let text = error.to_string();
+        let panic = error.try_into_panic().ok();
+        let lost = panic.and_then(|panic| lost_values(&*panic));
+        Err(lost.unwrap_or_else(|| Panicked(text).into()))
+    })
 }
 
 #[cfg(test)]

@@ -7,7 +7,6 @@ use std::{
 
 use crate::{
     capabilities::declarations,
-    column::require_kept,
     config::ShotFormat,
     error::{Cause, IoError, Locate, Result},
     files::PartialFolder,
@@ -85,7 +84,6 @@ fn write(site: &SiteProducts, formats: &[ShotFormat], to: &Path) -> Result<Vec<(
         .map_err(IoError::on("make a temporary folder in"))
         .in_file(to)?;
     let products = export_footprints(draft.path(), site, formats)?;
-    require_kept()?;
     let written = products.iter();
     let written: Vec<PathBuf> = written
         .map(|product| draft.path().join(&product.path))
@@ -98,7 +96,9 @@ fn write(site: &SiteProducts, formats: &[ShotFormat], to: &Path) -> Result<Vec<(
             .in_file(&path)?;
         Ok((path, product.rows))
     });
-    files.collect()
+    let files = files.collect::<Result<_>>()?;
+    atomic::sync_folder(to);
+    Ok(files)
 }
 
 /// Requires that `folder`, of which the last parts may be missing, is not among the products of a site.

@@ -7,7 +7,6 @@ use std::path::{Path, PathBuf};
 
 use crate::{
     capabilities::{declarations, page},
-    column::require_kept,
     error::{Cause, Locate, Result},
     products::{PAGE_DATA, PageData, REPORT},
     store::{
@@ -47,7 +46,6 @@ pub fn page_again(folder: &Path) -> Result<PageAgain> {
     let page = data
         .with(declarations(), page)
         .in_file(folder.join(PAGE_DATA))?;
-    require_kept()?;
     Ok(PageAgain {
         site: manifest.site.clone(),
         page,

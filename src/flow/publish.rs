@@ -12,7 +12,6 @@ use super::{
 };
 use crate::{
     capabilities::{declarations, page, write_products},
-    column::require_kept,
     config::SiteConfig,
     error::Result,
     files::file_name,
@@ -148,7 +147,6 @@ fn publish(config: &SiteConfig, site: &Site, from: &MadeFrom<'_>) -> Result<Mani
         .into_iter()
         .map(|product| (product.path, product.rows))
         .collect();
-    require_kept()?;
     read_back(config, site, kernels, &staging)?;
     let products = entries(&staging, &files)?;
     let manifest = manifest(config, site, (statements, products), ledger, inputs)?;

@@ -28,6 +28,7 @@ use crate::service::worker::protocol::{
     ANSWER_MAX, Answer, Cancel, Failure, Line, PROTOCOL, Task, What,
 };
 use crate::{
+    column::lost_values,
     difference::{Limits, Outcome, compare},
     error::{Error, Kind, Result},
     report::difference_page,
@@ -105,7 +106,10 @@ pub fn main(parent: Option<u32>) -> ExitCode {
             ExitCode::SUCCESS
         }
         Ok(Err(failure)) => fail(&worker.reporter, described(&failure)),
-        Err(panic) => fail(&worker.reporter, panicked(&*panic)),
+        Err(panic) => {
+            let lost = lost_values(&*panic).map(|lost| described(&lost));
+            fail(&worker.reporter, lost.unwrap_or_else(|| panicked(&*panic)))
+        }
     }
 }
 

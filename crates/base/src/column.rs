@@ -22,7 +22,7 @@ use std::{fmt, ops::Range, sync::Arc};
 use rayon::prelude::*;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
-pub use self::kept::{MEMORY_BYTES, require_kept};
+pub use self::kept::{MEMORY_BYTES, lost_values};
 use self::{kept::Kept, unpacked::Unpacked};
 use crate::packed::{self, Packed};
 
@@ -74,7 +74,8 @@ impl<T: Packed> Column<T> {
     /// The value in row `row`, counted from 0.
     ///
     /// # Panics
-    /// If the row does not exist.
+    /// If the row does not exist. If the temporary file does not return the piece, the task ends by unwinding; see
+    /// [`lost_values`].
     #[must_use]
     pub fn at(&self, row: usize) -> T {
         match self.pieces.get(row / PIECE) {

@@ -68,8 +68,11 @@ const DEFINITIONS: [(&str, &str); 7] = [
 /// Whether each of `rows` of so many footprints occurs there first.
 fn each_once(rows: &Values<u32>, footprints: usize) -> Vec<bool> {
     let mut seen = vec![false; footprints];
-    let is_first = |row: u32| !std::mem::replace(&mut seen[row as usize], true);
-    rows.iter().map(is_first).collect()
+    let mut is_first = |row: u32| {
+        let seen = seen.get_mut(row as usize);
+        seen.is_some_and(|seen| !std::mem::replace(seen, true))
+    };
+    rows.iter().map(&mut is_first).collect()
 }
 
 #[derive(Serialize, JsonSchema)]

@@ -1,7 +1,7 @@
 //! Failures as exceptions, and calls that Ctrl-C can stop.
 
 use std::{
-    panic,
+    panic::{self, AssertUnwindSafe},
     sync::{
         atomic::{AtomicBool, Ordering},
         mpsc::{self, RecvTimeoutError},
@@ -10,7 +10,10 @@ use std::{
     time::Duration,
 };
 
-use areograph::error::{Error, Kind, Result};
+use areograph::{
+    column::lost_values,
+    error::{Error, Kind, Result},
+};
 use pyo3::{
     create_exception,
     exceptions::{PyException, PyKeyboardInterrupt},
@@ -128,7 +131,10 @@ pub(crate) fn interruptible<T: Send>(
     match (worked, signal) {
         (_, Some(signal)) => Err(signal),
         (Ok(result), None) => result.map_err(|failure| exception(py, &failure)),
-        (Err(panicked), None) => panic::resume_unwind(panicked),
+        (Err(panicked), None) => match lost_values(&*panicked) {
+            Some(lost) => Err(exception(py, &lost)),
+            None => panic::resume_unwind(panicked),
+        },
     }
 }
 
@@ -140,5 +146,10 @@ pub(crate) fn detached<T: Send>(
     py: Python<'_>,
     work: impl FnOnce() -> Result<T> + Send,
 ) -> PyResult<T> {
-    py.detach(work).map_err(|failure| exception(py, &failure))
+    py.detach(|| panic::catch_unwind(AssertUnwindSafe(work)))
+        .unwrap_or_else(|panicked| match lost_values(&*panicked) {
+            Some(lost) => Err(lost),
+            None => panic::resume_unwind(panicked),
+        })
+        .map_err(|failure| exception(py, &failure))
 }

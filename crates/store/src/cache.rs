@@ -16,7 +16,7 @@ use std::{
 };
 
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
-use tempfile::SpooledTempFile;
+use tempfile::spooled_tempfile_in;
 
 use super::atomic;
 use crate::{
@@ -25,7 +25,6 @@ use crate::{
     stage::{Inputs, Output, Provenance, Reason},
 };
 use areograph_base::{
-    column::require_kept,
     error::{Cause, IoError, Locate, Result},
     stored::whole,
 };
@@ -161,8 +160,10 @@ impl StageCache {
             source,
         };
         let path = self.path(label);
+        // A folder that cannot be made is reported when the file is.
+        let _ = fs::create_dir_all(&self.folder);
         // The head contains the hash, and is written first.
-        let mut payload = SpooledTempFile::new(HELD_BYTES);
+        let mut payload = spooled_tempfile_in(HELD_BYTES, &self.folder);
         let mut writer = BufWriter::with_capacity(HASHED_AT_ONCE, Hashed::new(&mut payload));
         let stored = whole(|| postcard::to_io(&value, &mut writer)).map(drop);
         let flushed = writer.flush();
@@ -173,7 +174,6 @@ impl StageCache {
         flushed
             .map_err(IoError::on("write beside"))
             .in_file(&path)?;
-        require_kept()?;
         let (blake3, payload_bytes) = (writer.get_ref().hash(), writer.get_ref().bytes);
         drop(writer);
         // A field that is skipped when written cannot be read back, and the stage would run again every time.

@@ -350,7 +350,7 @@ impl Variant {
             let lines = lines.map(|of| format!("{} ({:.2}; {})", of.name, of.z(), of.beyond()));
             let _infallible = writeln!(
                 text,
-                "The same without valid sites that have a misplaced profile ({misplaced}; ratio and values beyond): {}.",
+                "Ratio (and values beyond) without the valid sites that have a misplaced profile, {misplaced} in number: {}.",
                 lines.collect::<Vec<_>>().join("; ")
             );
         }

@@ -1,17 +1,19 @@
 //! Packed pieces in memory, and in an unnamed temporary file.
 
 use std::{
+    any::Any,
     borrow::Cow,
     fs::File,
     io,
     os::unix::fs::FileExt as _,
+    panic::resume_unwind,
     sync::{
         Arc, Mutex, PoisonError,
-        atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering},
+        atomic::{AtomicU64, AtomicUsize, Ordering},
     },
 };
 
-use crate::error::{Cause, Result};
+use crate::error::{Cause, Error};
 
 /// Bytes of packed pieces that a process holds in memory; more lie in a temporary file.
 pub const MEMORY_BYTES: usize = 1 << 22;
@@ -20,29 +22,23 @@ const FILE_BYTES: u64 = 1 << 28;
 
 static IN_MEMORY: AtomicUsize = AtomicUsize::new(0);
 static PIECES: AtomicU64 = AtomicU64::new(0);
-static LOST: AtomicBool = AtomicBool::new(false);
 static FILE: Mutex<Option<(Arc<File>, u64)>> = Mutex::new(None);
 
-/// Values that cannot be read from a temporary file: results are not reliable.
+/// Values that cannot be read from a temporary file.
 #[derive(Debug, thiserror::Error, Cause)]
 #[error("values of shots cannot be read back from a temporary file")]
 #[cause(Io: "check the disk of temporary files (TMPDIR), and repeat the command")]
 struct LostValues;
 
-/// Ensures that all values read so far were there.
-///
-/// # Errors
-/// A temporary file could not be read: some values were replaced by 0.
-pub fn require_kept() -> Result<()> {
-    if has_lost_values() {
-        return Err(LostValues.into());
-    }
-    Ok(())
+/// Ends the task: no value stands for a lost one, and the many readers of single values return no errors.
+pub(super) fn lose() -> ! {
+    resume_unwind(Box::new(LostValues))
 }
 
-/// Whether a temporary file could not be read.
-pub(super) fn has_lost_values() -> bool {
-    LOST.load(Ordering::Relaxed)
+/// The failure of a task that ended since values of a column were lost; `None` for a panic.
+#[must_use]
+pub fn lost_values(panic: &(dyn Any + Send)) -> Option<Error> {
+    panic.is::<LostValues>().then(|| LostValues.into())
 }
 
 /// A packed piece.
@@ -60,6 +56,7 @@ enum Place {
         file: Arc<File>,
         start: u64,
         length: usize,
+        hash: blake3::Hash,
     },
 }
 
@@ -84,6 +81,7 @@ impl Kept {
                     file,
                     start,
                     length,
+                    hash: blake3::hash(&bytes),
                 }
             }
             None => Place::Memory(bytes.into()),
@@ -94,7 +92,7 @@ impl Kept {
         }
     }
 
-    /// The bytes; empty, which no piece is, if the file cannot be read.
+    /// The bytes; the task ends if the file does not return them.
     pub(super) fn bytes(&self) -> Cow<'_, [u8]> {
         match &self.place {
             Place::Memory(bytes) => Cow::Borrowed(bytes),
@@ -102,12 +100,11 @@ impl Kept {
                 file,
                 start,
                 length,
+                hash,
             } => {
-                let read = read(file, *start, *length);
-                if read.is_err() {
-                    LOST.store(true, Ordering::Relaxed);
-                }
-                Cow::Owned(read.unwrap_or_default())
+                let read = read(file, *start, *length).ok();
+                let intact = read.filter(|bytes| blake3::hash(bytes) == *hash);
+                Cow::Owned(intact.unwrap_or_else(|| lose()))
             }
         }
     }
@@ -144,7 +141,10 @@ fn filed(bytes: &[u8]) -> io::Result<(Arc<File>, u64)> {
 
 #[cfg(test)]
 mod tests {
+    use std::panic::catch_unwind;
+
     use super::*;
+    use crate::error::Kind;
 
     #[test]
     fn pieces_beyond_the_memory_lie_in_a_file() {
@@ -155,12 +155,16 @@ mod tests {
             assert!(matches!(piece.place, Place::File { .. }));
             assert_eq!(*piece.bytes(), vec![number; 1 + usize::from(number)]);
         }
+        // Another byte in the file, as after a write that the disk lost.
         let Place::File { file, start, .. } = &pieces[99].place else {
             panic!("not in a file");
         };
-        // More than there is: the last piece cannot be read.
-        assert_eq!(read(file, *start, 100).unwrap(), vec![99; 100]);
-        assert!(read(file, *start, 1 << 30).is_err());
+        file.write_all_at(&[98], *start + 50).unwrap();
+        let panic = catch_unwind(|| pieces[99].bytes().len()).unwrap_err();
+        assert_eq!(lost_values(&*panic).unwrap().kind(), Kind::Io);
+        assert_eq!(pieces[98].bytes().len(), 99);
+        let other = catch_unwind(|| panic!("another")).unwrap_err();
+        assert!(lost_values(&*other).is_none());
         let inside = Kept::within(usize::MAX, vec![1, 2]);
         assert!(matches!(inside.place, Place::Memory(_)));
         assert_eq!(*inside.bytes(), [1, 2]);

@@ -4,7 +4,7 @@ use std::{any::Any, cell::RefCell};
 
 use super::{
     PIECE,
-    kept::{Kept, has_lost_values},
+    kept::{Kept, lose},
 };
 use crate::packed::{self, Packed};
 
@@ -41,12 +41,12 @@ impl Unpacked {
         }
     }
 
-    /// The value in this row of a piece; the default value if the piece is lost.
+    /// The value in this row of a piece.
     pub(super) fn value<T: Packed>(piece: &Kept, row: usize) -> T {
         UNPACKED.with_borrow_mut(|unpacked| {
             let values = unpacked.slot::<T>(piece).values.downcast_ref::<Vec<T>>();
             let value = values.and_then(|values| values.get(row));
-            value.copied().unwrap_or_default()
+            value.copied().unwrap_or_else(|| lose())
         })
     }
 
@@ -70,8 +70,9 @@ impl Unpacked {
 
     /// Unpacks a piece in place of the one that was not used for longest.
     fn unpack<T: Packed>(&mut self, piece: &Kept) -> usize {
-        let values: Vec<T> = packed::values(&piece.bytes()).unwrap_or_default();
-        debug_assert!(values.len() == PIECE || has_lost_values());
+        let values: Option<Vec<T>> = packed::values(&piece.bytes());
+        let values = values.filter(|values| values.len() == PIECE);
+        let values = values.unwrap_or_else(|| lose());
         let slot = Slot {
             number: piece.number,
             used: self.clock,

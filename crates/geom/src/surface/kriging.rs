@@ -177,7 +177,7 @@ impl Kriging {
     /// covariance of the ground itself.
     ///
     /// With the factor `K = L Lᵀ` of the equations, the covariances `c` between shots and a place, its multiplier `μ` and
-    /// weights `w = K⁻¹ (c − μ 1)`, four of the five terms of `C − wᵢᵀcⱼ − wⱼᵀcᵢ + wᵢᵀK wⱼ` are
+    /// weights `w = K⁻¹ (c − μ 1)`, the last three terms of `C − wᵢᵀcⱼ − wⱼᵀcᵢ + wᵢᵀK wⱼ` are
     /// `−(L⁻¹cᵢ)ᵀ L⁻¹cⱼ + μᵢ μⱼ 1ᵀK⁻¹1`.
     pub(super) fn add_errors_m2(&self, sum: &mut DMatrix<f64>, relation: Relation) {
         let Relation {

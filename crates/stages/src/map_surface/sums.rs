@@ -14,8 +14,8 @@ pub(super) type Lines<const N: usize> = [Vec<f32>; N];
 /// Calls `each` for every cell of a tile, in order, with the sums of `N` numbers over the square about its middle; NaN where
 /// a number is missing. `add` adds these numbers of a line of the tile.
 ///
-/// A number is added up once for all squares that contain all lines of its cell. Sums over the lines of a cell are in single
-/// precision, all others in double.
+/// A number is added up once for all squares that contain all lines of its cell. Sums over the lines of a cell, and over the single
+/// lines beyond whole cells, are in single precision, all others in double.
 pub(super) fn over_squares<const N: usize>(
     tile: &Tile,
     per_cell: usize,

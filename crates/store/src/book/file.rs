@@ -20,7 +20,6 @@ use crate::{
     stage::{Output, Round},
 };
 use areograph_base::{
-    column::require_kept,
     error::{Cause, Error, IoError, Locate as _, Result},
     stored::whole,
 };
@@ -93,7 +92,6 @@ impl Book {
             return Err(IoError::on("write")(refusal).into());
         }
         written?;
-        require_kept()?;
         flushed.map_err(IoError::on("write"))?;
         Ok(to.get_ref().hash())
     }

@@ -19,10 +19,11 @@ impl InterpolationCheck {
     /// places beside nodes that their neighbours do not predict.
     ///
     /// # Accuracy
-    /// Errors from a tenth of the limit on are those of all places. Whatever moves the camera at the spacing of the nodes or more slowly shows at the nodes: a kink or a jump between
-    /// two of them is missed by twice its interpolation error or more when every second node predicts the others. What
-    /// repeats from node to node appears at the places between any two. A motion that begins and ends between the same
-    /// two nodes is found if one of the places lies in it; ten image lines last a few milliseconds.
+    /// Whatever moves the camera at the spacing of the nodes or more slowly shows at the nodes: a kink or a jump between
+    /// two of them is missed by twice its interpolation error or more when every second node predicts the others.
+    /// From a tenth of the limit on, such errors are those of all places. What repeats from node to node appears at the
+    /// places between any two. A single motion that begins and ends between the same two nodes is found only if one of the
+    /// compared places lies in it, in one of ten cases; ten image lines last a few milliseconds.
     pub(crate) fn of(
         image: &ImageTimes,
         tables: &CameraTables,
