@@ -277,12 +277,14 @@ impl Values {
     }
 }
 
+/// Returns the values of some columns, by their declared places, in some rows.
+type ValuesOf<'a> = dyn Fn(&[usize], Range<usize>) -> Vec<Values> + Sync + 'a;
+
 /// Rows with the meanings of their columns; their values are computed piece by piece.
 pub(super) struct Table<'a> {
     columns: Vec<(usize, Meaning)>,
     rows: usize,
-    /// The values of some columns, by their declared places, in some rows.
-    values: Box<dyn Fn(&[usize], Range<usize>) -> Vec<Values> + Sync + 'a>,
+    values: Box<ValuesOf<'a>>,
 }
 
 impl<'a> Table<'a> {
