@@ -384,7 +384,7 @@ fn findings(config: &SiteConfig, book: &Book) -> Result<Findings> {
         };
         let missing = of.by_period.map_or(0, |of| of.missing);
         format!(
-            "profile {}: {:.0} % of the pulses have no shot ({missing} of {}), expected at most {:.0} %; check \
+            "profile {}: {:.0} % of the pulses have no shot ({missing} of {}); expected at most {:.0} %; check \
              pedr.filter and the outline of the window{more}",
             profile.id,
             100.0 * of.missing_share(),

@@ -131,8 +131,8 @@ fn listed(metakernel: Option<PathBuf>, files: Option<Vec<PathBuf>>) -> KernelLis
 declare_table! {
     /// Alternatively, 2 to 16 rival sets with the same clocks, each complete and given by either `metakernel` or
     /// `files`. As in Shan et al. 2005, the set whose trajectory is closest to the mean of all sets is used (root mean
-    /// square distance over the positions that the site needs); the manifest states the distances. Two sets are equally
-    /// far from their mean; the first is then used.
+    /// square distance over the positions that the site needs); the manifest states the distances. If there are only
+    /// two sets, they are equally far from their mean, and the first is used.
     fill RivalKernels {
         /// Identifier, unique in the site.
         id = key(lower_case_identifier()).required().unused(r#""nav""#).unused_in(1, r#""ipng""#),

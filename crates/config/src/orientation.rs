@@ -17,7 +17,7 @@ declare_table! {
         /// al. 2005; a second-order polynomial requires at least four epochs to leave residuals.
         intervals: u32 = key(whole_from_to(3, 10_000)).or(30),
         /// Origin of straight rays to the ground: one convention for all camera positions. Files for ISIS and ALE, in
-        /// `exchange/centre`, have the convention of these programs in every run. For every image, the distances to the
+        /// `exchange/centre`, follow the convention of these programs in every run. For every image, the distances to the
         /// other conventions are reported. Ranges are always geometric.
         light_time: LightTime = key(words_of(LightTime::WORDS, [
             "camera position when the light left the ground: light time to the surface and aberration",

@@ -84,7 +84,7 @@ declare_table! {
         /// GeoJSON file.
         polygon: Option<PathBuf> = key(FILE).example_in(1, r#""outline.geojson""#),
         /// Identifier of an image of the site. The window is the outline of this image, computed from image times and
-        /// kernels (of rival sets, the first).
+        /// kernels (the first set, if there are rival sets).
         image: Option<String> = key(identifier()).example_in(2, r#""E02-02855""#),
         /// Smallest margin of the window beyond the outline of the image.
         margin_km: Option<f64> = key(from_to(0.0, 1_000.0)).example_in(2, "5.0"),

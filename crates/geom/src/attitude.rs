@@ -124,27 +124,6 @@ pub fn matrix_of_rotation_vector(vector_rad: &Vector3<f64>) -> Matrix3<f64> {
     Rotation3::new(*vector_rad).into_inner()
 }
 
-/// Below this angle, radians, the first terms that the series of [`matrix_of_small_vector`] omit are below 1e-16.
-const SMALL_RAD: f64 = 0.05;
-
-/// [`matrix_of_rotation_vector`] within rounding, faster for a small vector.
-#[must_use]
-pub fn matrix_of_small_vector(vector_rad: &Vector3<f64>) -> Matrix3<f64> {
-    let square = vector_rad.norm_squared();
-    // Written so that NaN does not count as small.
-    if !(square <= SMALL_RAD * SMALL_RAD) {
-        return matrix_of_rotation_vector(vector_rad);
-    }
-    let sine =
-        1.0 - square * (1.0 / 6.0) * (1.0 - square * (1.0 / 20.0) * (1.0 - square * (1.0 / 42.0)));
-    let cosine =
-        0.5 - square * (1.0 / 24.0) * (1.0 - square * (1.0 / 30.0) * (1.0 - square * (1.0 / 56.0)));
-    let outer = cosine * vector_rad * vector_rad.transpose();
-    let straight = 1.0 - cosine * square;
-    let [x, y, z] = (sine * vector_rad).into();
-    outer + Matrix3::new(straight, -z, y, z, straight, -x, -y, x, straight)
-}
-
 /// Below this angle, radians, the two factors of [`left_jacobian_product`] are taken from their series,
 /// whose next terms are below 1e-11 of them there.
 const SERIES_BELOW_RAD: f64 = 1e-2;

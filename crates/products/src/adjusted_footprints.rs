@@ -80,7 +80,7 @@ fn shot_columns<'a>() -> Vec<Column<Shot<'a>>> {
         columns.push(column(
             sigma,
             Unit::Metre,
-            "standard deviation of the adjusted coordinate, including the shift of its profile, metres",
+            "standard deviation of the adjusted coordinate, including the uncertainty of the profile's shift, metres",
             move |shot: &Shot| sigma_m(shot.0, axis),
         ));
     }

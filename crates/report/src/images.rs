@@ -145,7 +145,8 @@ fn light_time(site: &SiteProducts) -> Markup {
             );
         }
     }
-    words += " Files in exchange/centre have the convention of ISIS and ALE, centre, in every run.";
+    words +=
+        " Files in exchange/centre follow the convention of ISIS and ALE, centre, in every run.";
     paragraph(&words)
 }
 

@@ -94,7 +94,8 @@ impl HashCache {
             return;
         }
         match self.add(&learnt) {
-            Ok(()) => files.note_kept(learnt),
+            Ok(true) => files.note_kept(learnt),
+            Ok(false) => {}
             Err(failure) => tracing::warn!("hashes of input files cannot be stored: {failure}"),
         }
     }
@@ -122,20 +123,21 @@ impl HashCache {
         }
     }
 
-    fn add(&self, learnt: &[KnownFile]) -> Result<()> {
+    /// Whether they were added.
+    fn add(&self, learnt: &[KnownFile]) -> Result<bool> {
         let mut name = OsString::from(&self.path);
         name.push(".lock");
         let Some(_lock) = wait_for_lock(Path::new(&name))? else {
             // The holder of the lock is stopped. Reading files again costs less than waiting for it.
-            return Ok(());
+            return Ok(false);
         };
         let mut known = self.known();
         for file in learnt {
             known.add(*file);
         }
         match encoded(known.iter().copied().collect()) {
-            Some(bytes) => atomic::replace_unflushed(&self.path, &bytes, MARK),
-            None => Ok(()),
+            Some(bytes) => atomic::replace_unflushed(&self.path, &bytes, MARK).map(|()| true),
+            None => Ok(false),
         }
     }
 }

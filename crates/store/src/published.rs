@@ -15,7 +15,7 @@ use areograph_base::error::{Cause, IoError, Locate, Result};
 pub enum PublishedError {
     /// Nothing was published.
     #[error("there is no {MANIFEST}, so there are no products")]
-    #[cause("name the product folder of a site, and run the site to the end")]
+    #[cause("name the products folder of a site whose run is complete")]
     NoManifest,
     /// A run was killed, or is in progress, while files received their final names.
     #[error("the publication of products into this folder was not finished")]

@@ -125,7 +125,7 @@ fn invalid_because(
     let height_max_m = height_max_m(limits, surface);
     if !(shots.above_m.median.abs() <= height_max_m) {
         reasons.push(format!(
-            "terrain model: {altimeter} lies {} m above the model (median of {} shots), expected at most {height_max_m:.1} m",
+            "terrain model: {altimeter} lies {} m above the model (median of {} shots); expected at most {height_max_m:.1} m",
             signed(shots.above_m.median, 1),
             shots.above_m.n
         ));
@@ -133,7 +133,7 @@ fn invalid_because(
     let spread_max = limits.surface_spread_max_sigma;
     if !(shots.spread_sigmas <= spread_max) {
         reasons.push(format!(
-            "terrain model: {altimeter} scatters about the model by {:.1} standard deviations, expected at most {spread_max:.1}",
+            "terrain model: shots of {altimeter} scatter about the model by {:.1} standard deviations; expected at most {spread_max:.1}",
             shots.spread_sigmas
         ));
     }

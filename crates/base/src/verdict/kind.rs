@@ -30,7 +30,7 @@ pub enum CheckKind {
     RangeOutliers,
     /// Number of shots in the longest profile.
     Shots,
-    /// Clock correction with the smallest spread of ranges minus the configured correction.
+    /// Difference between the clock correction that minimises the spread of the ranges and the configured correction.
     ClockCorrection,
     /// Number of simultaneous footprints inside an image, among those expected from the mountings of camera and laser.
     FootprintsInside,

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{ExteriorOrientation, PolynomialPath, Pose, PoseRate};
 use crate::{
-    attitude::{left_jacobian_product, matrix_of_rotation_vector, matrix_of_small_vector},
+    attitude::{left_jacobian_product, matrix_of_rotation_vector},
     nearby_angle::NearbyAngle,
     polynomial::Polynomial,
 };
@@ -218,19 +218,6 @@ impl ExteriorOrientation for RotationVectorPolynomial {
         };
         (self.pose(x), motion)
     }
-
-    fn pose_and_rate_near(&self, x: f64, _anchor: &Anchor) -> (Pose, PoseRate) {
-        let vector_rad = self.vector_rad.value(x);
-        let pose = Pose {
-            position_m: self.path_m.value(x),
-            mars_to_camera: matrix_of_small_vector(&vector_rad) * self.reference,
-        };
-        let motion = PoseRate {
-            advance_m: self.path_m.rate(x),
-            turn_rad: left_jacobian_product(&vector_rad, &self.vector_rad.rate(x)),
-        };
-        (pose, motion)
-    }
 }
 
 impl PolynomialPath for RotationVectorPolynomial {
@@ -258,28 +245,20 @@ mod tests {
             path_m,
             angles_rad: polynomial(Vector3::new(2.9, -1.1, -2.0), turn, 1e-4 * turn),
         };
-        let vector = RotationVectorPolynomial {
-            path_m,
-            vector_rad: polynomial(1e-3 * turn, turn, 1e-4 * turn),
-            reference: euler.pose(0.0).mars_to_camera,
-        };
-        let models: [&dyn ExteriorOrientation; 2] = [&euler, &vector];
-        for model in models {
-            // Within the image, at the limit of the series, and beyond.
-            for (anchor, x) in [
-                (0.0, 0.0),
-                (0.0, 80.0),
-                (-4_000.0, -4_080.0),
-                (0.0, 9_000.0),
-                (0.0, 4e5),
-            ] {
-                let (pose, motion) = model.pose_and_rate(x);
-                let (near, motion_near) = model.pose_and_rate_near(x, &model.anchor(anchor));
-                assert_eq!(pose.position_m, near.position_m);
-                // Rounding of products of sines and cosines.
-                assert!((pose.mars_to_camera - near.mars_to_camera).amax() < 1e-15);
-                assert!((motion.turn_rad - motion_near.turn_rad).amax() < 1e-20);
-            }
+        // Within the image, at the limit of the series, and beyond.
+        for (anchor, x) in [
+            (0.0, 0.0),
+            (0.0, 80.0),
+            (-4_000.0, -4_080.0),
+            (0.0, 9_000.0),
+            (0.0, 4e5),
+        ] {
+            let (pose, motion) = euler.pose_and_rate(x);
+            let (near, motion_near) = euler.pose_and_rate_near(x, &euler.anchor(anchor));
+            assert_eq!(pose.position_m, near.position_m);
+            // Rounding of products of sines and cosines.
+            assert!((pose.mars_to_camera - near.mars_to_camera).amax() < 1e-15);
+            assert!((motion.turn_rad - motion_near.turn_rad).amax() < 1e-20);
         }
     }
 }

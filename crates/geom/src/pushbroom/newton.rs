@@ -179,7 +179,7 @@ impl<'a, M: ExteriorOrientation + ?Sized> Projector<'a, M> {
         Self { distortion, ..self }
     }
 
-    /// For many points: poses follow from those of the nodes by short series. Lines are the same within 1e-10.
+    /// For many points and orientations by angles: poses follow from those of the nodes by short series. Lines are the same within 1e-10.
     #[must_use]
     pub fn anchored(self) -> Self {
         Self {

@@ -3,10 +3,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Anchor, ExteriorOrientation, Pose, PoseRate};
-use crate::attitude::{
-    left_jacobian_product, matrix_of_rotation_vector, matrix_of_small_vector, rotation_vector,
-};
+use super::{ExteriorOrientation, Pose, PoseRate};
+use crate::attitude::{left_jacobian_product, matrix_of_rotation_vector, rotation_vector};
 
 /// Orientation that interpolates every one of its samples.
 ///
@@ -164,21 +162,10 @@ impl ExteriorOrientation for SampledOrientation {
     }
 
     fn pose_and_rate(&self, x: f64) -> (Pose, PoseRate) {
-        self.turned(x, matrix_of_rotation_vector)
-    }
-
-    fn pose_and_rate_near(&self, x: f64, _anchor: &Anchor) -> (Pose, PoseRate) {
-        self.turned(x, matrix_of_small_vector)
-    }
-}
-
-impl SampledOrientation {
-    /// The pose with its change per line, with the matrix that `matrix` makes of a rotation vector.
-    fn turned(&self, x: f64, matrix: impl Fn(&Vector3<f64>) -> Matrix3<f64>) -> (Pose, PoseRate) {
         let (position_m, vector_rad) = self.curves(x);
         let pose = Pose {
             position_m: position_m.value,
-            mars_to_camera: matrix(&vector_rad.value) * self.reference,
+            mars_to_camera: matrix_of_rotation_vector(&vector_rad.value) * self.reference,
         };
         let motion = PoseRate {
             advance_m: position_m.slope,

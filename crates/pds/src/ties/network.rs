@@ -124,7 +124,7 @@ pub(super) fn known(of: &Coordinates<'_>) -> std::result::Result<Option<KnownGro
     }
     let [Some(x_m), Some(y_m), Some(z_m)] = of.xyz_m else {
         return Err(format!(
-            "its type is {kind}, but AprioriX, AprioriY and AprioriZ are not three numbers; the point is treated as free"
+            "its type is {kind}, but AprioriX, AprioriY or AprioriZ is missing or invalid; the point is treated as free"
         ));
     };
     let covariance_m2 = match (fixed, &of.covariance) {

@@ -91,8 +91,8 @@ fn light_time(site: &SiteProducts) -> String {
     }
     let body = site.config.terms().body();
     let mut text = format!(
-        "Files in the folder centre/ have the light-time convention of ISIS and ALE in every run: positions as seen from the\n\
-         centre of {body} (LT+S). Other camera models, lines and samples, and kernels have the convention of this run,\n\
+        "Files in the folder centre/ follow the light-time convention of ISIS and ALE in every run: positions as seen from the\n\
+         centre of {body} (LT+S). Other camera models, lines and samples, and kernels follow the convention of this run,\n\
          {}.\n\
          With the orientation from the kernels, a ground point has different lines in the two conventions: ../registration.json\n\
          states the differences for each image; isis_line and isis_sample of ../registration.parquet are those of ISIS.\n\n",
@@ -176,7 +176,7 @@ fn about(program: Program, terms: &Terms<'_>) -> String {
             ALE files where the latter do not describe the camera: the time of a line includes the summing, samples\n\
             and the detector's centre count from the detector's edge, there is no distortion, and the pointing covers\n\
             the whole image. The member areograph.interpolation states the measured interpolation error. The models\n\
-            in centre/ have the light-time convention of ISIS and ALE."
+            in centre/ follow the light-time convention of ISIS and ALE."
             .to_owned(),
         Program::AdjustedKernels => "\
             The adjusted site (../adjustment.json describes the adjustment and its accuracy).\n\

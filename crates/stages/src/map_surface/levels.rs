@@ -74,7 +74,7 @@ pub(super) fn all_levels(
         }
         let sample_m = height_of_sample_m(times);
         let reach_m = (reach + 1) as f64 * sample_m;
-        let seen = seen(&level, &known.heights_m, (reach, reach_m));
+        let seen = seen(&level, &known.heights_m, reach_m);
         let unseen = (tiles(&level) - seen.len()) * passes(times);
         watch.step(unseen as u64, "tiles");
         cells = every_tile(&level, &seen, watch, |seen| {

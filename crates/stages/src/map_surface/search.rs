@@ -7,7 +7,7 @@ use super::{
     level::{Known, Level},
     pair::Pair,
     seen::Seen,
-    sums::{COUNT, HALF, Lines, add_numbers, add_products, over_squares},
+    sums::{COUNT, HALF, Lines, add_numbers, add_products, centre, over_squares},
 };
 use areograph_base::{error::Result, ties::Unmatched};
 
@@ -42,10 +42,7 @@ pub(super) fn search(
     let mut images = [Vec::new(), Vec::new()];
     for step in 0..=2 * reach {
         pair.lay((step as f64 - reach as f64) * step_m, &mut images);
-        for numbers in images.iter_mut().flatten() {
-            // Numbers relative to the middle of a byte lose fewer digits.
-            *numbers -= 128.0;
-        }
+        images.iter_mut().for_each(|numbers| centre(numbers));
         let mut alike = alike.iter_mut();
         let compare = |sums| {
             if let Some(alike) = alike.next() {

@@ -30,16 +30,12 @@ fn all(level: &Level<'_>) -> Vec<Tile> {
     Tile::all(level.ground.size, edge, level.per_cell, MARGIN)
 }
 
-/// The parts of all tiles of a level that both images may show if the ground is within `reach` samples of parallax, or `reach_m`,
-/// of these heights.
-pub(super) fn seen(
-    level: &Level<'_>,
-    heights_m: &Field,
-    (reach, reach_m): (usize, f64),
-) -> Vec<Seen> {
+/// The parts of all tiles of a level that both images may show if the ground is within `reach_m` of these
+/// heights.
+pub(super) fn seen(level: &Level<'_>, heights_m: &Field, reach_m: f64) -> Vec<Seen> {
     let seen = all(level).into_par_iter().filter_map(|tile| {
-        let one = near(level, 0, &tile.cells, heights_m, reach)?;
-        let other = near(level, 1, &tile.cells, heights_m, reach)?;
+        let one = near(level, 0, &tile.cells, heights_m, reach_m)?;
+        let other = near(level, 1, &tile.cells, heights_m, reach_m)?;
         let cells = [0, 1]
             .map(|axis| one[axis].start.max(other[axis].start)..one[axis].end.min(other[axis].end));
         if cells.iter().any(Range::is_empty) {
@@ -64,22 +60,23 @@ fn near(
     image: usize,
     [rows, columns]: &[Range<usize>; 2],
     heights_m: &Field,
-    reach: usize,
+    reach_m: f64,
 ) -> Option<[Range<usize>; 2]> {
     let view = level.views[image];
-    let place = |[row, column]: [usize; 2]| {
+    let place_above = |[row, column]: [usize; 2], above_m: f64| {
         let [last_row, last_column] = heights_m.size.map(|size| size - 1);
         let known = row.min(last_row) * heights_m.size[1] + column.min(last_column);
-        let height_m = f64::from(heights_m.values[known]);
+        let height_m = f64::from(heights_m.values[known]) + above_m;
         view.place(&level.ground.place_m([row as f64, column as f64], height_m))
     };
+    let place = |at| place_above(at, 0.0);
     let middle = [rows, columns].map(|cells| cells.start + cells.len() / 2);
     let here = place(middle)?;
     let down_px = place([middle[0] + APART, middle[1]])? - here;
     let right_px = place([middle[0], middle[1] + APART])? - here;
-    let step_px = down_px.norm() + right_px.norm();
-    // A cell is closer than this to the one that stands for it, and moves by less than the rest.
-    let room_px = step_px * (1.0 + 2.0 * reach as f64 / (APART * level.per_cell) as f64);
+    let moved_px = place_above(middle, reach_m)? - here;
+    // A cell is closer than the first two terms to the one that stands for it, and a height moves it by the last.
+    let room_px = down_px.norm() + right_px.norm() + moved_px.norm();
     let size_px = view.size_px();
     let mut near: Option<[Range<usize>; 2]> = None;
     for row in rows.clone().step_by(APART) {

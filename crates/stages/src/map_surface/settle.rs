@@ -12,7 +12,7 @@ use super::{
     level::{Known, Level},
     pair::Pair,
     seen::Seen,
-    sums::{COUNT, EDGE, HALF, Lines, add_numbers, add_products, over_squares},
+    sums::{COUNT, EDGE, HALF, Lines, add_numbers, add_products, centre, over_squares},
 };
 use areograph_base::{error::Result, ties::Unmatched};
 
@@ -105,9 +105,7 @@ impl Slopes {
                 }
             }
         }
-        for number in &mut numbers {
-            *number -= 128.0;
-        }
+        centre(&mut numbers);
         let [along, across] = slopes;
         Self([numbers, along, across])
     }

@@ -84,6 +84,23 @@ fn sum(numbers: &[f64]) -> f64 {
     (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
 }
 
+/// Subtracts the mean of the known numbers, which comparisons of images ignore: sums in single precision lose fewer digits.
+#[allow(
+    clippy::cast_possible_truncation,
+    reason = "grey values need few digits"
+)]
+pub(super) fn centre(numbers: &mut [f32]) {
+    let (mut sum, mut count) = (0.0, 0_u32);
+    for number in numbers.iter().filter(|number| number.is_finite()) {
+        sum += f64::from(*number);
+        count += 1;
+    }
+    let mean = (sum / f64::from(count.max(1))) as f32;
+    for number in numbers {
+        *number -= mean;
+    }
+}
+
 /// Adds numbers to sums.
 pub(super) fn add_numbers(sums: &mut [f32], numbers: &[f32]) {
     for (sum, number) in sums.iter_mut().zip(numbers) {
@@ -101,6 +118,42 @@ pub(super) fn add_products(sums: &mut [f32], one: &[f32], other: &[f32]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A bright image that is nearly flat: its variance is a millionth of its mean square.
+    #[test]
+    fn sums_over_a_bright_flat_square_keep_the_variance() {
+        let margin = HALF + 2;
+        let tiles = Tile::all([5, 5], 5, 3, margin);
+        let tile = &tiles[0];
+        let width = tile.size[1];
+        let bright: Vec<f32> = (0..tile.size[0] * width)
+            .map(|at| 250.0 + 0.003 * ((at * 7919) % 251) as f32)
+            .collect();
+        let mut numbers = bright.clone();
+        numbers[0] = f32::NAN;
+        centre(&mut numbers);
+        assert!(numbers[0].is_nan());
+        let mut found = Vec::new();
+        let add = |line: usize, [sums, squares]: &mut Lines<2>| {
+            let row = &numbers[line * width..(line + 1) * width];
+            add_numbers(sums, row);
+            add_products(squares, row, row);
+        };
+        over_squares(tile, 3, add, |sums| found.push(sums));
+        for ((_, [line, sample]), [sum, squares]) in tile.middles(3, 5).zip(found) {
+            let square = (line - HALF..=line + HALF)
+                .flat_map(|line| &bright[line * width..][sample - HALF..=sample + HALF]);
+            let square: Vec<f64> = square.copied().map(f64::from).collect();
+            let mean = square.iter().sum::<f64>() / (COUNT as f64);
+            let expected = square.iter().map(|of| (of - mean).powi(2)).sum::<f64>();
+            let variance = squares - sum * sum / (COUNT as f64);
+            // Rounding of a few hundred sums in single precision.
+            assert!(
+                (variance / expected - 1.0).abs() < 1e-5,
+                "{variance} {expected}"
+            );
+        }
+    }
 
     #[test]
     fn sums_are_those_of_every_square_for_all_samples_of_a_cell() {

@@ -56,7 +56,7 @@ impl<'a> IsisImage<'a> {
     pub(super) fn projector(&self) -> Option<Projector<'_, SampledOrientation>> {
         let lines = f64::from(self.image.line_times.lines());
         let projector = Projector::new(&self.orientation, lines).ok()?;
-        Some(projector.through(self.detector.distortion).anchored())
+        Some(projector.through(self.detector.distortion))
     }
 
     /// Line and sample of a point in the delivered file; [`UNSEEN`] outside it.

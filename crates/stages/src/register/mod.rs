@@ -130,7 +130,7 @@ stage_inputs! {
 
 impl Stage for Register<'_> {
     const NAME: &'static str = "register";
-    const METHOD: u32 = 3;
+    const METHOD: u32 = 4;
     type Output = ImageRegistration;
     stage_inputs!(fingerprint);
 

@@ -90,7 +90,7 @@ fn accuracy() -> Vec<Comparison> {
     let windows = real_shots::smooth_windows();
     let each = windows.map(|(name, crossings, sigma_m)| {
         number(
-            format!("{name}, 1 σ of a shot from {crossings} crossings, m"),
+            format!("{name}, 1 σ of a shot from {crossings} crossovers, m"),
             "1",
             sigma_m,
             2,
