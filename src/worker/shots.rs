@@ -97,7 +97,7 @@ pub(super) fn search(search: &Search<'_>, stop: &AtomicBool) -> Result<(u64, boo
             left -= rows;
             let found = found.slice(0, usize::try_from(rows).unwrap_or(usize::MAX));
             let found = with_site(&found, &site).in_file(&path)?;
-            answer.write(&found)?;
+            answer.write(found)?;
             if !complete {
                 break;
             }
@@ -226,7 +226,7 @@ impl<'a> Answer<'a> {
         Ok(writer)
     }
 
-    fn write(&mut self, batch: &RecordBatch) -> Result<()> {
+    fn write(&mut self, batch: RecordBatch) -> Result<()> {
         self.begin(&batch.schema())?.write(batch)
     }
 

@@ -6,7 +6,7 @@ use std::{
     sync::Arc,
 };
 
-use arrow_array::{ArrayRef, Float64Array, RecordBatch, StructArray};
+use arrow_array::{ArrayRef, Float32Array, RecordBatch, StructArray};
 use arrow_schema::{DataType, Field, Fields, Schema, SchemaRef};
 use serde_json::{Value, json};
 
@@ -34,7 +34,8 @@ use areograph_store::{
     files::{Mark, MarkAt, require_own},
 };
 
-/// The column of the bounding box of each point, and its parts: readers of GeoParquet use it to skip rows.
+/// The column of the bounding box of each point, and its parts: readers of GeoParquet use it to skip rows. Single
+/// precision, rounded outward, halves its size.
 const BBOX: &str = "bbox";
 const BBOX_PARTS: [&str; 4] = ["xmin", "ymin", "xmax", "ymax"];
 /// Columns that shots are selected by: a search may keep several values of each, so that GIS has them too; and their
@@ -278,7 +279,7 @@ impl ShotsFile {
         if self.format == RowsFormat::Parquet {
             batch = with_boxes(&batch, &self.schema, &points_deg).in_file(path)?;
         }
-        self.rows.write(&batch)
+        self.rows.write(batch)
     }
 
     /// Ends the file with `search`, the query and the completeness of its answer, and gives it its name.
@@ -334,7 +335,7 @@ fn with_bbox(schema: &SchemaRef) -> SchemaRef {
 }
 
 fn bbox_fields() -> Fields {
-    let part = |name: &str| Field::new(name, DataType::Float64, false);
+    let part = |name: &str| Field::new(name, DataType::Float32, false);
     BBOX_PARTS.map(part).to_vec().into()
 }
 
@@ -344,17 +345,36 @@ fn with_boxes(
     schema: &SchemaRef,
     points_deg: &[[f64; 2]],
 ) -> std::result::Result<RecordBatch, ProductError> {
-    let axis = |axis: usize| -> ArrayRef {
-        let values = points_deg.iter().map(|point| point[axis]);
-        Arc::new(Float64Array::from_iter_values(values))
+    let side = |axis: usize, rounded: fn(f64) -> f32| -> ArrayRef {
+        let values = points_deg.iter().map(|point| rounded(point[axis]));
+        Arc::new(Float32Array::from_iter_values(values))
     };
-    let (x, y) = (axis(0), axis(1));
-    let parts = vec![Arc::clone(&x), Arc::clone(&y), x, y];
+    let parts = vec![
+        side(0, below),
+        side(1, below),
+        side(0, above),
+        side(1, above),
+    ];
     let boxes = StructArray::try_new(bbox_fields(), parts, None);
     let boxes: ArrayRef = Arc::new(boxes.map_err(ProductError::refused("assemble columns"))?);
     let arrays = batch.columns().iter().cloned().chain([boxes]).collect();
     RecordBatch::try_new(Arc::clone(schema), arrays)
         .map_err(ProductError::refused("assemble columns"))
+}
+
+/// The nearest single-precision number that is not above `value`.
+#[expect(clippy::cast_possible_truncation, reason = "the rounding is corrected")]
+fn below(value: f64) -> f32 {
+    let nearest = value as f32;
+    if f64::from(nearest) > value {
+        return nearest.next_down();
+    }
+    nearest
+}
+
+/// The nearest single-precision number that is not below `value`.
+fn above(value: f64) -> f32 {
+    -below(-value)
 }
 
 /// Columns of the bounding box of each row.

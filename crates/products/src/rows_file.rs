@@ -3,7 +3,10 @@
 use std::{
     fs::File,
     io::{BufWriter, Read as _, Write},
+    panic::resume_unwind,
     path::Path,
+    sync::mpsc::{SyncSender, sync_channel},
+    thread::{self, JoinHandle},
 };
 
 use ::parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
@@ -97,16 +100,28 @@ enum RowsError {
     #[error("columns of these rows differ from those of earlier rows")]
     #[cause(like = NoPoints)]
     Differ,
+    #[error("rows were written after an error of earlier rows")]
+    #[cause(Bug: "report this with the command and the log")]
+    Ended,
 }
 
 /// Destination of rows.
 pub type Out = Box<dyn Write + Send>;
 
-/// Rows being written; a file gets its final name when finished.
+/// Rows being written by a thread of its own, so that they are encoded while the next ones are found; a file gets its
+/// final name when finished.
 pub struct RowsWriter {
     staged: Option<StagedFile>,
-    form: Form,
+    /// Rows for the thread, which ends when this is dropped.
+    batches: Option<SyncSender<RecordBatch>>,
+    /// The thread until it is joined.
+    thread: Option<JoinHandle<Result<Rows>>>,
     schema: SchemaRef,
+}
+
+/// Rows in their form.
+struct Rows {
+    form: Form,
     rows: u64,
 }
 
@@ -135,11 +150,9 @@ impl RowsWriter {
 
     fn staged(staged: StagedFile, format: RowsFormat, schema: SchemaRef) -> Result<Self> {
         let path = staged.path().to_owned();
-        let writer = Self::new(Box::new(staged.writer()?), format, schema).in_file(path)?;
-        Ok(Self {
-            staged: Some(staged),
-            ..writer
-        })
+        let mut writer = Self::new(Box::new(staged.writer()?), format, schema).in_file(path)?;
+        writer.staged = Some(staged);
+        Ok(writer)
     }
 
     /// Begins rows of these columns that go to `out`.
@@ -163,27 +176,36 @@ impl RowsWriter {
                 Form::GeoJson(out)
             }
         };
+        let mut rows = Rows { form, rows: 0 };
+        // One batch waits while another is encoded.
+        let (batches, received) = sync_channel::<RecordBatch>(1);
+        let thread = thread::spawn(move || {
+            for batch in received {
+                rows.append(&batch)?;
+            }
+            Ok(rows)
+        });
         Ok(Self {
             staged: None,
-            form,
+            batches: Some(batches),
+            thread: Some(thread),
             schema,
-            rows: 0,
         })
     }
 
     /// Appends rows.
     ///
     /// # Errors
-    /// Other columns than before; columns that text cannot hold; errors of the disk.
-    pub fn write(&mut self, batch: &RecordBatch) -> Result<()> {
-        let written = self.append(batch);
+    /// Other columns than before. Of these or of earlier rows: columns that text cannot hold; errors of the disk.
+    pub fn write(&mut self, batch: RecordBatch) -> Result<()> {
+        let written = self.send(batch);
         match &self.staged {
             Some(staged) => written.in_file(staged.path()),
             None => written,
         }
     }
 
-    fn append(&mut self, batch: &RecordBatch) -> Result<()> {
+    fn send(&mut self, batch: RecordBatch) -> Result<()> {
         let (fields, begun) = (batch.schema(), self.schema.fields().iter());
         let begun = begun.map(|of| (of.name(), of.data_type()));
         if !begun.eq(fields
@@ -193,6 +215,56 @@ impl RowsWriter {
         {
             return Err(RowsError::Differ.into());
         }
+        let batches = self.batches.as_ref();
+        if batches.is_some_and(|batches| batches.send(batch).is_ok()) {
+            return Ok(());
+        }
+        // The thread ended early, because of an error.
+        self.join().map(|_| ())
+    }
+
+    /// The rows when all of them are encoded.
+    fn join(&mut self) -> Result<Rows> {
+        drop(self.batches.take());
+        match self.thread.take().map(JoinHandle::join) {
+            Some(Ok(ended)) => ended,
+            Some(Err(panic)) => resume_unwind(panic),
+            None => Err(RowsError::Ended.into()),
+        }
+    }
+
+    /// Ends the rows, and returns their number.
+    ///
+    /// * `notes` – metadata of Parquet, text by key; members of GeoJSON, whose text is JSON; CSV cannot hold them
+    ///
+    /// # Errors
+    /// Errors of earlier rows; errors of the disk; a Parquet file that is read back with another number of rows.
+    pub fn finish(mut self, notes: Vec<(&str, String)>) -> Result<u64> {
+        let ended = self.join().and_then(|of| of.end(notes));
+        let Some(staged) = self.staged.take() else {
+            return ended.map(|(rows, _)| rows);
+        };
+        let (rows, is_parquet) = ended.in_file(staged.path())?;
+        if is_parquet {
+            require_rows(staged.reader()?, rows).in_file(staged.path())?;
+        }
+        staged.finish()?;
+        Ok(rows)
+    }
+}
+
+impl Drop for RowsWriter {
+    /// Waits for the thread, so that nobody writes to an unfinished file when it is removed.
+    fn drop(&mut self) {
+        drop(self.batches.take());
+        if let Some(thread) = self.thread.take() {
+            let _unfinished = thread.join();
+        }
+    }
+}
+
+impl Rows {
+    fn append(&mut self, batch: &RecordBatch) -> Result<()> {
         match &mut self.form {
             Form::Parquet(writer) => writer.write(batch).map_err(parquet::refused)?,
             Form::Csv(out) => {
@@ -213,24 +285,11 @@ impl RowsWriter {
         Ok(())
     }
 
-    /// Ends the rows, and returns their number.
-    ///
-    /// * `notes` – metadata of Parquet, text by key; members of GeoJSON, whose text is JSON; CSV cannot hold them
-    ///
-    /// # Errors
-    /// Errors of the disk; a Parquet file that is read back with another number of rows.
-    pub fn finish(self, notes: Vec<(&str, String)>) -> Result<u64> {
-        let (is_parquet, rows) = (matches!(self.form, Form::Parquet(_)), self.rows);
-        let ended = self.form.end(notes);
-        let Some(staged) = self.staged else {
-            return ended.map(|()| rows);
-        };
-        ended.in_file(staged.path())?;
-        if is_parquet {
-            require_rows(staged.reader()?, rows).in_file(staged.path())?;
-        }
-        staged.finish()?;
-        Ok(rows)
+    /// Ends the rows: their number, and whether they can be read back.
+    fn end(self, notes: Vec<(&str, String)>) -> Result<(u64, bool)> {
+        let is_parquet = matches!(self.form, Form::Parquet(_));
+        self.form.end(notes)?;
+        Ok((self.rows, is_parquet))
     }
 }
 

@@ -143,9 +143,9 @@ impl Answer {
                 match format {
                     RowsFormat::Csv => {
                         let texts = as_text(&batch).map_err(NotWritten::refused)?;
-                        writer.write(&texts)?;
+                        writer.write(texts)?;
                     }
-                    RowsFormat::Parquet | RowsFormat::GeoJson => writer.write(&batch)?,
+                    RowsFormat::Parquet | RowsFormat::GeoJson => writer.write(batch)?,
                 }
                 Ok(!is_gone.load(Ordering::Relaxed))
             }
