@@ -10,10 +10,11 @@ use super::{
 };
 use crate::{config::CalibrationConfig, flow::Task};
 
-/// Calibrates the lines of a camera in orbit: ties between them, then laser points, part of which are withheld for validation.
+/// Calibrates the lines of a camera in orbit, first from tie points, then from laser points, some of which are withheld for
+/// validation.
 ///
-/// Points are read from tables; with `ties.match` and `[laser]` they are measured in pixels, in rounds until convergence. A
-/// calibration that was stopped or killed resumes at the stage of the round that it did not complete.
+/// Points are read from tables; with `ties.match` and `[laser]` they are measured in the images, in rounds until convergence. A
+/// calibration that was stopped or killed resumes at the first incomplete stage of its round.
 ///
 /// Products go to `<out>/<calibration>`, with calibrated support data (ISD) of every line. Angles that tie points cannot determine
 /// are detected and reported.

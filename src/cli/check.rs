@@ -13,8 +13,8 @@ use crate::{
 
 /// Checks configuration, files and kernel coverage, and reports all errors that would stop a run.
 ///
-/// The verdict is that of the products in --out, if they are up to date. With --full, the command otherwise computes every
-/// stage and reports all causes that would make products invalid.
+/// The verdict is that of the products in --out, if they are up to date. If they are not, --full computes every stage and
+/// reports all causes that would make products invalid.
 ///
 /// Examples:
 ///   areograph check sites/gusev.toml
@@ -28,8 +28,8 @@ pub(super) struct Arguments {
     /// Compute every stage for the verdict of a run, unless products are up to date; no product is written.
     #[arg(long)]
     full: bool,
-    /// Folder of products of a run, which must be apart from the inputs; kernels that a run into it has read are not read
-    /// again if they did not change.
+    /// Folder of the products of a run, separate from the inputs; unchanged kernels that such a run has read are not read
+    /// again.
     #[arg(long, default_value = "out")]
     out: PathBuf,
     /// Read every input file again, even if it did not change.

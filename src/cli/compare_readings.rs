@@ -14,14 +14,14 @@ use crate::{
     units::{RADIANS_PER_ARCSECOND, SECONDS_PER_MS},
 };
 
-/// Compares causes of the along-track disagreement of images over many pairs.
+/// Compares possible causes of the along-track disagreement of images, over many pairs.
 ///
-/// Either every image has its own error, in its line times or its attitude; or attitudes were read at times with one offset,
+/// Either every image has its own error, in its line times or its attitude; or all attitudes were read with one time offset,
 /// which displaces images that follow nadir, but not inertially held images. One pair does not distinguish the causes
-/// (`adjustment.attitude_clock` is a decision); many pairs of one mission may. The products contain the disagreement of each
-/// pair with the orientation from the kernels; every site must have complete products of this version. Images are identified by
-/// `id`; the same two images in several sites are one observation. Omit the pairs of Shan et al. 2005: the hypothesis of an
-/// offset, and the default sizes, come from them. A cause is supported if its odds are 150 to 1 or more.
+/// (`adjustment.attitude_clock` is a decision); many pairs of one mission may. The products state the disagreement of each
+/// pair, computed with the orientation from the kernels; every site must have complete products of this version. Images
+/// are identified by `id`; the same two images in several sites are one observation. Omit the pairs of Shan et al. 2005: the
+/// hypothesis of an offset and the default sizes come from them. A cause is supported if its odds are 150 to 1 or more.
 ///
 /// Examples:
 ///   areograph compare-readings products --page readings.html
@@ -29,7 +29,7 @@ use crate::{
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
-    /// Products of a site, or output folders, from which every site is used.
+    /// Products of a site, or output folders, of which every site is used.
     #[arg(required = true, value_name = "OUT")]
     folders: Vec<PathBuf>,
     /// Size of large errors of single images, as a standard deviation of line times, 1e-3 to 1e5; by default

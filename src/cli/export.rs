@@ -10,9 +10,9 @@ use clap::{
 use super::output;
 use crate::{config::ShotFormat, error::Result, flow::export_site};
 
-/// Writes the footprints of a site in the formats of other programs, from its products.
+/// Writes the footprints in the products of a site in the formats of other programs.
 ///
-/// The files are the footprints that a run writes for `products.formats` in the site file. No site file, kernel or stored stage
+/// The files are those that a run writes for `products.formats` in the site file. No site file, kernel or stored stage
 /// is read; products that are missing, damaged or of another version are refused.
 ///
 /// Example: `areograph export out/gusev_crater gpkg csv --to gis`

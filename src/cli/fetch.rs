@@ -26,9 +26,9 @@ use crate::{
 ///
 /// A site file states what is needed: its images, and the folders and files that do not exist yet. Without a site file,
 /// options state it. Kernels are chosen by the coverage in the index of their archive, laser files by orbits, images by
-/// the cumulative index, tables of shots by the windows. Transfers are resumed, and verified by size and checksum, or
-/// by their rows; a file appears complete or not at all. fetch.json records every file. Other files are never replaced
-/// without --replace.
+/// the cumulative index, tables of shots by the windows. Transfers are resumed, and files are verified by size and
+/// checksum, tables of shots by their rows; a file appears complete or not at all. fetch.json records every file. Other
+/// files are never replaced without --replace.
 ///
 /// Examples:
 ///   areograph fetch gale.toml --index
@@ -61,7 +61,7 @@ pub(super) struct Arguments {
     edges_deg: Option<[f64; 4]>,
     #[command(flatten)]
     meaning: BoxMeaning,
-    /// Fetch the latest leap seconds of NAIF's generic kernels into this folder.
+    /// Fetch NAIF's latest generic leap-second kernel into this folder.
     #[arg(long, value_name = "DIR")]
     generic_kernels: Option<PathBuf>,
     /// First and last orbit of the laser files.
@@ -70,7 +70,7 @@ pub(super) struct Arguments {
     /// Only files of these kinds.
     #[arg(long, value_name = "KIND", value_delimiter = ',')]
     only: Vec<Kind>,
-    /// Table with other hosts or layouts, in the form of config/archives/mgs.toml.
+    /// File with other hosts or layouts, in the form of config/archives/mgs.toml.
     #[arg(long, value_name = "FILE")]
     archives: Option<PathBuf>,
     /// Update the copies of the indexes, and exit.
@@ -82,7 +82,7 @@ pub(super) struct Arguments {
     /// Read every fetched file again, compare it with its record, and exit.
     #[arg(long, conflicts_with = "audit")]
     verify: bool,
-    /// Compare the folder with the copies of the indexes: what is missing, differs or is not needed, and exit.
+    /// Compare the folder with the copies of the indexes, list files that are missing, differ or are not needed, and exit.
     #[arg(long)]
     audit: bool,
     /// Do not request new indexes first.

@@ -99,7 +99,7 @@ enum Command {
     /// Inspects kernels: load order, gaps in coverage, differences between alternative sets.
     #[command(after_help = "Example: areograph kernels coverage kernels/nav.tm")]
     Kernels(kernels::Arguments),
-    /// Reads images of the camera, and finds them in the mission's index.
+    /// Inspects images of the camera, and finds them in the mission's index.
     #[command(after_help = "Example: areograph image info M0100115.imq")]
     Image(image::Arguments),
     /// Inspects PEDR files, and searches archives of them.
@@ -122,15 +122,15 @@ enum Command {
     Worker(worker::Arguments),
 }
 
-/// Parses the command line, runs the command, reports failures on standard error.
+/// Parses the command line, runs the command and reports failures on standard error.
 #[must_use]
 pub fn main() -> ExitCode {
     main_of(std::env::args_os())
 }
 
-/// As [`main`] with these arguments, of which the first is the name of the program.
+/// Like [`main`], with these arguments; the first is the name of the program.
 ///
-/// A wrong command line ends the process.
+/// An invalid command line ends the process.
 #[must_use]
 pub fn main_of(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> ExitCode {
     let cli = Cli::parse_from(arguments);

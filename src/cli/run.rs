@@ -48,7 +48,7 @@ pub(super) struct Arguments {
     /// Output folder; each site is written to a subfolder.
     #[arg(long, default_value = "out")]
     out: PathBuf,
-    /// Sites that run at the same time (SPICE itself serves one at a time).
+    /// Number of sites that run at the same time (SPICE itself serves one at a time).
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u16).range(1..=64))]
     jobs: u16,
     /// Worker threads; by default one per core. Products do not depend on it.

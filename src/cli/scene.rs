@@ -58,7 +58,7 @@ struct Target {
 struct MissionArguments {
     #[command(flatten)]
     target: Target,
-    /// Seconds of shots in the files of whole days, 600 to 90000; images and windows fit into 600.
+    /// Seconds of shots in the files of whole days, 600 to 90000; 600 suffice for images and windows.
     #[arg(long, value_name = "SECONDS", default_value_t = SECONDS_PER_DAY)]
     day_s: f64,
     /// Draw errors of the size that the real mission may have had, instead of those of the worked example: line times,
@@ -69,7 +69,7 @@ struct MissionArguments {
     /// With --realistic: roughness of the ground (heights 300 m apart differ by 5, 10 or 25 m).
     #[arg(long, value_enum, default_value_t = Ground::Plains, requires = "realistic")]
     roughness: Ground,
-    /// With --realistic: noise of tie points, lines and samples, 0 to 5; stereo matching reaches 0.22.
+    /// With --realistic: noise of tie points in line and sample, 0 to 5; stereo matching reaches 0.22.
     #[arg(
         long,
         value_name = "PIXELS",
@@ -162,7 +162,7 @@ struct ArchiveArguments {
     size: ArchiveSize,
 }
 
-/// Size of an archive, one of the two.
+/// Size of an archive, in files or in gigabytes.
 #[derive(Debug, Args)]
 #[group(required = true, multiple = false)]
 struct ArchiveSize {

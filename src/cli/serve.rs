@@ -38,7 +38,7 @@ const FILE: &str = "areograph.toml";
 /// Maximum time of a graceful shutdown.
 const END_WITHIN: Duration = Duration::from_secs(25);
 
-/// Runs sites again when their inputs change, every night at the latest; serves pages and an interface for programs.
+/// Runs sites again when their inputs change, no later than the next night; serves pages and an interface for programs.
 ///
 /// Example: `areograph serve --init demo && areograph serve demo/areograph.toml`
 #[derive(Debug, Args)]

@@ -35,7 +35,7 @@ pub(super) struct Arguments {
 enum Command {
     Init(init::Arguments),
     Check(check::Arguments),
-    /// Copy the database, also while the service runs.
+    /// Copies the database, even while the service runs.
     #[command(after_help = "Example: areograph service backup areograph.toml copy.sqlite")]
     Backup {
         /// Configuration of the service (TOML).
@@ -43,13 +43,13 @@ enum Command {
         /// File to write; it must not exist.
         file: PathBuf,
     },
-    /// Make a new database from the products; jobs, events and tokens are lost.
+    /// Creates a new database from the products; jobs, events and tokens are lost.
     #[command(after_help = "Example: areograph service rebuild areograph.toml")]
     Rebuild {
         /// Configuration of the service (TOML).
         config: PathBuf,
     },
-    /// Tokens that let people and programs use the service.
+    /// Manages the tokens by which people and programs use the service.
     #[command(
         subcommand,
         after_help = "Example: areograph service token list areograph.toml"
@@ -59,7 +59,7 @@ enum Command {
 
 #[derive(Debug, Subcommand)]
 enum TokenCommand {
-    /// Make a token and print it once.
+    /// Creates a token and prints it once.
     #[command(
         after_help = "Example: areograph service token add areograph.toml --role read --days 30"
     )]
@@ -76,7 +76,7 @@ enum TokenCommand {
         #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
         days: Option<u16>,
     },
-    /// List tokens, without their secrets.
+    /// Lists tokens, without their secrets.
     #[command(after_help = "Example: areograph service token list areograph.toml")]
     List {
         /// Configuration of the service (TOML).
@@ -85,7 +85,7 @@ enum TokenCommand {
         #[arg(long)]
         json: bool,
     },
-    /// Revoke a token, and the sessions that were started with it.
+    /// Revokes a token, and the sessions that were started with it.
     #[command(after_help = "Example: areograph service token revoke areograph.toml 01234567")]
     Revoke {
         /// Configuration of the service (TOML).
@@ -100,7 +100,7 @@ enum TokenCommand {
 enum RoleName {
     /// View only.
     Read,
-    /// View, start and cancel jobs, pin runs.
+    /// View; start and cancel jobs; pin runs.
     Operate,
 }
 

@@ -23,7 +23,7 @@ pub(super) struct RunArguments {
     flags: RunFlags,
 }
 
-/// Flags of every run, that of a site too.
+/// Flags of every run, including that of a site.
 #[derive(Debug, Clone, Args)]
 #[allow(clippy::struct_excessive_bools, reason = "command-line flags")]
 pub(super) struct RunFlags {
@@ -33,7 +33,7 @@ pub(super) struct RunFlags {
     /// Read all input files, stored outputs and products again, even if unchanged.
     #[arg(long)]
     pub(super) rehash: bool,
-    /// State how many stages would run, and why (with -v for each stage), as `areograph plan`; write no products.
+    /// State how many stages would run, and why (with -v for each stage), as `areograph plan` does; write no products.
     #[arg(long)]
     pub(super) plan: bool,
     /// Print JSON.

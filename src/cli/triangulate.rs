@@ -37,7 +37,7 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
     let (task, name) = (Task::Net(&net), &net.net);
     single::run(task, name, &arguments.out, &arguments.run, |count| {
         format!(
-            "{} pictures, {} points, {} blunders, {} controls rejected out of {}",
+            "{} pictures, {} points, {} blunders, {} of {} controls rejected",
             count("pictures"),
             count("points"),
             count("blunders"),

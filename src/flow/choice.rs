@@ -95,7 +95,7 @@ fn choose_kernels(
             chosen: 0,
             entries: Vec::new(),
             notes: vec![format!(
-                "kernel set {first} is used: no required position allows a comparison of the sets"
+                "kernel set {first} is used: the site requires no positions at which the sets could be compared"
             )],
         });
     }

@@ -23,7 +23,8 @@ use crate::{
 enum ReadingsError {
     /// No site has a pair that shows a displacement along the track.
     #[error(
-        "no pair of images in {0} shows a cause; expected two images with common tie points, flown in the same direction and apart across the track"
+        "no pair of images in {0} shows a cause; expected two images with common tie points, taken in the same flight \
+         direction and separated across the track"
     )]
     #[cause(Input: "name products of sites with such pairs")]
     NoPairs(String),
@@ -146,7 +147,7 @@ pub fn compare_readings(folders: &[PathBuf], sigmas: ReadingSigmas) -> Result<Re
                     continue;
                 }
                 Some(_) => "also in an earlier site",
-                None => "not flown in the same direction, or not apart across the track",
+                None => "not taken in the same flight direction, or not separated across the track",
             };
             not_used.push((format!("{site}, {}", images.join(" and ")), reason));
         }

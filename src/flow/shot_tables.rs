@@ -25,7 +25,8 @@ enum Misplaced {
         "a table of the Orbital Data Explorer, which contains no spacecraft positions; expected PEDR files"
     )]
     #[cause(
-        "name the table in [[shots]] of a site, with layout = \"ode_pedr\" and kernels: the range check compares both"
+        "name the table in [[shots]] of a site, with layout = \"ode_pedr\" and kernels: the range check compares the table \
+         with the kernels"
     )]
     NotPedr,
 }
@@ -93,8 +94,8 @@ pub(super) fn described(table: &SearchedTable) -> Value {
 pub fn state_nadir_by_range(answer: &mut Value) {
     answer["nadir_by_range"] = true.into();
     answer["range_minus_distance_m"] = Value::Null;
-    answer["remark"] = "a table contains no spacecraft position: the position is assumed on the radius through the \
-        footprint, at the range, so a comparison of range and distance does not apply"
+    answer["remark"] = "a table contains no spacecraft position: the spacecraft is assumed to be on the radius through the \
+        footprint, one range above it, so that range and distance cannot be compared"
         .into();
 }
 

@@ -51,7 +51,7 @@ enum ShotsError {
     Manifest(serde_json::Error),
     /// A product that this program did not write, or that a library rejects.
     #[error("cannot be {0}")]
-    #[cause(Input: "regenerate products of another version of areograph with this version")]
+    #[cause(Input: "if another version of areograph wrote the products, regenerate them with this version")]
     Parquet(String),
 }
 

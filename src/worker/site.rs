@@ -29,7 +29,7 @@ struct OtherKeys {
 
 /// A run that ended before its products were written.
 #[derive(Debug, thiserror::Error, Cause)]
-#[error("the run ended after {0}; expected products")]
+#[error("the run ended after {0}; expected a run with products")]
 #[cause(Bug: "this is a bug in areograph; please report it with the configuration")]
 struct NoProducts(String);
 

@@ -45,7 +45,7 @@ fn a_spacecraft_that_stands_still_is_refused() {
     assert_eq!(failure.kind(), Kind::Input);
     let told = failure.to_string();
     assert!(
-        told.contains("image E02-00665: ") && told.contains("flies across its lines"),
+        told.contains("image E02-00665: ") && told.contains("moves along its detector line"),
         "{told}"
     );
     assert!(

@@ -169,7 +169,7 @@ fn a_site_follows_the_result_and_states_it() {
     refused(
         &output,
         2,
-        "the path of a file that `areograph compare-readings --toml` printed",
+        "the path of a file with the output of `areograph compare-readings --toml`",
     );
     // Written by the user as well, the key has no effect.
     fs::write(&readings, decision("attitude_clock", [17.0, -20.0])).unwrap();

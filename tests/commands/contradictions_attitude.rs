@@ -195,7 +195,7 @@ const WITHOUT_TIES: &[Mistake] = &[
         "bus_28_degrees_and_no_footprint_inside",
         |case| turn(case, Vector3::new(1.0, 1.0, 0.0).normalize(), 0.489),
         End::Refused,
-        "simultaneous footprints inside, and the mountings",
+        "simultaneous footprints inside, whereas the mountings",
     ),
     (
         // Beam and camera look along this axis.

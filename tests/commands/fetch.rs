@@ -637,7 +637,7 @@ fn files_of_others_are_never_replaced_unasked() {
     write(&path, &archive.original(KERNEL_PATH));
     let told = archive.fetched(&kernels);
     assert!(
-        told.contains("mgs_ext1.bsp: was present, and matches the file of the archive"),
+        told.contains("mgs_ext1.bsp: was present and matches the file of the archive"),
         "{told}"
     );
     assert_eq!(archive.server.sent(KERNEL_PATH), 0);

@@ -180,7 +180,7 @@ fn products_that_contradict_the_manifest_are_refused() {
     case.write("aside/case/ranges.json", "{}");
     case.replace("aside/case/manifest.json", &hash(&product), &hash(b"{}"));
     let expected = "exit 3\nerror: case: aside/case/ranges.json: cannot be read as range statistics: missing field \
-                    `profiles` at line 1 column 2\n  what to do: regenerate products of another version of areograph \
-                    with this version\n";
+                    `profiles` at line 1 column 2\n  what to do: if another version of areograph wrote the products, \
+                    regenerate them with this version\n";
     assert_eq!(diff(&case, &["before", "aside"]), expected);
 }

@@ -125,7 +125,7 @@ impl Site {
             ranges: ranges(&profiles),
             rejected: BTreeMap::from([("class 0 <cloud>".to_owned(), 7)]),
             complaints: vec!["ap19019l.b record 4: <script>alert(1)</script> & more".to_owned()],
-            notes: vec!["ap19019l.b: in IAU 2000 already, not converted".to_owned()],
+            notes: vec!["ap19019l.b: already in IAU 2000, not converted".to_owned()],
             config,
             times,
             orientation,

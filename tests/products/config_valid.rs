@@ -231,10 +231,10 @@ fn entries_that_are_never_used_are_told() {
         .replace(&prefix, "");
     assert_eq!(
         warnings,
-        "site.toml:2:58: kernels.pinned is never used: it belongs to kernels.root\n\
+        "site.toml:2:58: kernels.pinned is never used: it applies only with kernels.root\n\
          site.toml:3:46: altimeter_clock.bias_s is never used: altimeter_clock.scope is \"none\"\n\
          site.toml:4:11: windows are never used without a table [pedr] or tables [[shots]]\n\
-         site.toml:5:10: images without a table [pedr]: orientation only, no footprints and no range check\n\
+         site.toml:5:10: images without a table [pedr] or tables [[shots]]: orientation only, no footprints and no range check\n\
          site.toml:5:89: images.utc_start is never used: sclk_start comes first"
     );
 }

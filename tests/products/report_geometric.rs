@@ -64,8 +64,8 @@ fn the_first_lines_tell_how_far_images_disagree_before_and_after() {
     let [before_sigma_m, sigma_m] = [&site.pairs[0], &site.adjusted_pairs[0]]
         .map(|pair| pair.footprints.as_ref().unwrap().apart_sigma_m.unwrap());
     let words = format!(
-        ", along track: a footprint falls {:.2} shot spacings ({before_m:.0} m, σ {before_sigma_m:.1} m) apart before the \
-         adjustment; {:.3} shot spacings ({after_m:.1} m, σ {sigma_m:.1} m) after it.",
+        ", along track: the two positions of a footprint were on average {:.2} shot spacings ({before_m:.0} m, σ \
+         {before_sigma_m:.1} m) apart before the adjustment; {:.3} shot spacings ({after_m:.1} m, σ {sigma_m:.1} m) after it.",
         before_m / spacing_m,
         after_m / spacing_m,
     );
@@ -73,7 +73,7 @@ fn the_first_lines_tell_how_far_images_disagree_before_and_after() {
     assert!(told.contains(&words), "{words}\n{told}");
     let minus = |value: f64| format!("{value:+.1}").replace('-', "−");
     let heights = format!(
-        "{} m median of {} tie points, controlled by MOLA; {} m of {} before, independent of it",
+        "{} m median of {} tie points, controlled by MOLA; before the adjustment {} m, median of {}, independent of it",
         minus(site.adjusted_heights.above_m.median),
         site.adjusted_heights.above_m.n,
         minus(site.heights.above_m.median),
@@ -169,7 +169,7 @@ fn pairs_tell_their_residuals_and_footprints_before_and_after() {
         }
     }
     let profiles = pairs.map(|pair| &pair.footprints.as_ref().unwrap().profiles);
-    let rows = table(&page, "Footprints between the images");
+    let rows = table(&page, "Misregistration of footprints");
     assert_eq!(rows.len(), profiles[0].len());
     for (index, row) in rows.iter().enumerate() {
         let of = profiles.map(|profiles| &profiles[index]);
@@ -384,7 +384,7 @@ fn what_cannot_be_trusted_is_said() {
     // The surface controls tie points across the track in part: with its spacing of shots not all of them.
     let shown = table(
         &page,
-        "Redundancy: fraction of a gross error visible in its own residual",
+        "Redundancy: fraction of a gross error that appears in the residual of its observation",
     );
     let across = shown
         .iter()
@@ -483,7 +483,9 @@ fn exact_shots_contribute_nothing_with_signs_and_much_as_published() {
         unreachable!("orientation explains less than is observed");
     };
     assert!(along_px * pixel_m > 100.0, "{along_px}");
-    assert!(section(&page, SECTIONS[2]).contains("it is not the accuracy of the altimeter"));
+    assert!(
+        section(&page, SECTIONS[2]).contains("This remainder is not the accuracy of the altimeter")
+    );
 }
 
 #[test]
@@ -536,7 +538,7 @@ fn accuracy_by_the_values_of_another_spacecraft_is_withheld() {
     assert!(!text(lead(&page)).contains("m height"));
     assert!(!page.contains("Ellipses: 1 σ"));
     assert!(page.contains("absolute accuracies are withheld"));
-    assert!(page.contains("The accuracy of position by relief is withheld"));
+    assert!(page.contains("The accuracy of the position from relief is withheld"));
     let rows = table(&page, "Two readings");
     for row in &rows {
         assert!(!row[0].contains('±'), "{row:?}");
@@ -550,7 +552,7 @@ fn accuracy_by_the_values_of_another_spacecraft_is_withheld() {
     // Profiles are withheld from the surface as well, and predicted from it.
     for words in [
         "accuracies are withheld",
-        "by relief is withheld",
+        "from relief is withheld",
         ">withheld<",
     ] {
         assert!(!page.contains(words), "{words}");
@@ -574,7 +576,7 @@ fn a_variance_component_outside_its_interval_is_shown_with_the_verdict() {
     let found = check(&site);
     assert_eq!(found.outcome, CheckOutcome::Pass);
     assert!(found.subject.contains("MOLA ranges 0.00"), "{found}");
-    assert!(section(&site.page(), SECTIONS[1]).contains("Below their interval"));
+    assert!(section(&site.page(), SECTIONS[1]).contains("below their interval"));
     // Above it: a remark with both numbers.
     let types = &mut site.adjusted.summary.types;
     let ranges = types
@@ -585,11 +587,10 @@ fn a_variance_component_outside_its_interval_is_shown_with_the_verdict() {
     let limit = ranges.variance_component_limits[1];
     assert_eq!(check(&site).outcome, CheckOutcome::Warning);
     let remarks = site.verdict().remarks.join("\n");
-    let expected = format!(
-        "residuals of MOLA ranges are 1.50 times their a priori standard deviations, by chance at most {limit:.2}"
-    );
+    let expected =
+        format!("the variance component of MOLA ranges is 1.50, by chance at most {limit:.2}");
     assert!(remarks.contains(&expected), "{remarks}");
-    assert!(section(&site.page(), SECTIONS[1]).contains("Above their interval"));
+    assert!(section(&site.page(), SECTIONS[1]).contains("above their interval"));
 }
 
 #[test]
@@ -656,7 +657,7 @@ fn tie_points_tell_the_misregistration_where_no_footprint_is_in_both_images() {
     let page = site.page();
     let words = section(&page, SECTIONS[0]);
     assert!(
-        words.contains("along track: a tie point falls")
+        words.contains("along track: the two positions of a tie point were")
             && words.contains(&format!("({before_m:.0} m) apart before the adjustment"))
             && words.contains(&format!("({after_m:.1} m)")),
         "{words}"

@@ -55,7 +55,7 @@ fn the_page_of_many_images_hardly_grows_with_them() {
         );
     }
     assert!(many.contains("<caption>All images</caption>"));
-    assert!(many.contains("1 of 240 images are not valid."));
+    assert!(many.contains("Invalid images: 1 of 240."));
     for index in 0..240 {
         let file = format!("<a href=\"../images/M04-{index:05}/orientation.json\">");
         assert!(many.contains(&file), "{file}");

@@ -130,7 +130,7 @@ fn what_came_from_files_stays_text() {
     assert!(page.contains("class 0 &lt;cloud&gt;"));
     assert!(!page.contains("<script"));
     assert!(page.contains(">naif0012.tls</th>"));
-    assert!(page.contains("<li>ap19019l.b: in IAU 2000 already"));
+    assert!(page.contains("<li>ap19019l.b: already in IAU 2000"));
 }
 
 #[test]

@@ -635,13 +635,13 @@ fn what_is_wrong_with_camera_and_line_times_is_said() {
         (
             "[orientation]",
             "[pointing]\nck_bias_s = -1.15\n[orientation]",
-            "attitude kernels of Mars Express, which carries HRSC infrared line, need no time correction",
+            "attitude kernels of Mars Express (camera: HRSC infrared line) need no time correction",
         ),
         // 6.955 s from UTC by the real clock kernel.
         (
             utc,
             "sclk_start = '1/0150552525.072'\n",
-            "clock readings in Mars Express labels differ by seconds from the clock kernels",
+            "clock readings in Mars Express labels disagree with the clock kernels by seconds",
         ),
         (
             utc,

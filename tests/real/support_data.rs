@@ -164,7 +164,8 @@ const MISTAKES: [Mistake; 4] = [
             *centre = json!(number(centre) + 500.0);
         },
         5,
-        "its camera differs in detector.boresight_px from the built-in file of MOC narrow angle, whose frame the camera names, 7",
+        "its camera differs in detector.boresight_px from the built-in file of MOC narrow angle, although both name \
+         the same frame, 7",
     ),
     (
         "those of another image",
@@ -349,7 +350,7 @@ const DAMAGES: [Damage; 16] = [
             let start = isd["starting_ephemeris_time"].as_f64().unwrap();
             isd["starting_ephemeris_time"] = json!(start + 1.0);
         },
-        "expected the time of the first line computed from line_scan_rate",
+        "expected the time of the first line according to line_scan_rate",
     ),
     (
         "more lines than tables",

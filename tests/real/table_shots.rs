@@ -299,7 +299,7 @@ const REFUSED: [(&str, &str, &str, &str); 6] = [
         "a pointing bias at the Moon",
         "[ties]",
         "[pointing]\nck_bias_s = -1.15\n[ties]",
-        "no such entry on the Moon: it belongs to Mars Global Surveyor",
+        "no such entry for the Moon: it applies only to Mars Global Surveyor",
     ),
     (
         "a datum of another body",

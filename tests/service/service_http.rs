@@ -600,7 +600,7 @@ const PAGES: &[(&str, &[&str])] = &[
         "/sites/gamma",
         &["is invalid and did not become current", "limit 50 m"],
     ),
-    ("/jobs", &["crashes at stage register", "href=\"/jobs/4\""]),
+    ("/jobs", &["crashed at stage register", "href=\"/jobs/4\""]),
     ("/jobs?state=running", &["beta"]),
     (
         "/jobs/4",

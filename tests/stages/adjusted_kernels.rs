@@ -334,7 +334,7 @@ fn another_bias_is_kept_for_the_run_and_not_for_isis() {
     let (distance_m, turn_rad) = apart(&image.sampled_with(&set), &adjusted);
     assert!(distance_m < 1e-3 && turn_rad < 1e-9); // as with the usual bias
     let bytes = fs::read(folder.path().join("adjusted/E02-02016.bc")).unwrap();
-    assert!(String::from_utf8_lossy(&bytes).contains("exchange/centre there"));
+    assert!(String::from_utf8_lossy(&bytes).contains("exchange/centre in these programs"));
     // The pair for ISIS, which `written` has read back with the usual bias, states that bias.
     let bytes = fs::read(folder.path().join("exchange/centre/E02-02016_adjusted.bc")).unwrap();
     assert!(String::from_utf8_lossy(&bytes).contains("stored at t - 1.150 s"));

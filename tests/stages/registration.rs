@@ -186,7 +186,7 @@ fn every_profile_is_tried_in_an_image_that_sees_nothing() {
     let found = registered(&site);
     assert!(found.points.is_empty());
     let reasons: Vec<&String> = found.rejected.keys().collect();
-    assert_eq!(reasons, ["the camera flies across its lines"]);
+    assert_eq!(reasons, ["the camera moves along its detector line"]);
     assert_eq!(found.rejected.values().sum::<u64>(), u64::from(SHOTS));
 }
 

@@ -251,7 +251,10 @@ fn what_the_tables_do_not_reach_and_what_is_no_number_is_refused() {
         let failure = reorient(orientation, times, shift_lines, nothing).unwrap_err();
         assert_eq!(failure.kind(), Kind::Input);
         let text = failure.to_string();
-        assert!(text.contains("expected within the camera tables"), "{text}");
+        assert!(
+            text.contains("expected times within the camera tables"),
+            "{text}"
+        );
     }
     let broken = |x: f64| moved(Vector3::new(0.0, if x > 0.0 { f64::NAN } else { 0.0 }, 0.0));
     let failure = reorient(orientation, times, 0.0, broken).unwrap_err();

@@ -212,7 +212,7 @@ fn what_cannot_be_intersected_is_counted() {
     assert!(
         failure
             .to_string()
-            .contains("image 2, counted from 0; expected one of 2 images")
+            .contains("image 2, counted from 0; expected an image below 2")
     );
 }
 

@@ -408,7 +408,7 @@ fn stated_heights_hold_against_truth() {
     let single = root_mean_square(single.into_iter());
     println!("single heights over theirs: {single:.2}; relative {relative_m:.1} m");
     assert!((0.7..1.3).contains(&single), "{single}");
-    // Good tie points lost: 0.2 % at most.
+    // Correct tie points rejected: 0.2 % at most.
     let lost: usize = all.iter().map(|site| site.lost.len()).sum();
     let good: usize = all.iter().map(|site| site.errors_m.len()).sum();
     println!("{lost} of {good} good tie points lost");

@@ -37,7 +37,7 @@ pub enum TagSign {
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum BiasScope {
-    /// The spacecraft's position in the range check: the default, one of three readings of Shan et al. 2005.
+    /// The spacecraft's position in the range check: the default, one of three interpretations of Shan et al. 2005.
     SpkLookup,
     /// The rotation into IAU 2000 (the rotation from the file's datum remains at the time tag).
     Rotation,

@@ -63,7 +63,7 @@ pub enum AdjustmentModel {
     /// Heights of tie points from the MOLA surface; orientations from the a priori orbit and attitude.
     MolaSurface,
     /// As published: image coordinates of footprints constrain the orientations, and one standard deviation per image
-    /// represents all unknowns (Yoon & Shan 2004).
+    /// applies to all unknowns (Yoon & Shan 2004).
     Published,
 }
 

@@ -69,7 +69,7 @@ fn spacecraft_of_id<'de, D: Deserializer<'de>>(
     deserializer: D,
 ) -> Result<&'static Spacecraft, D::Error> {
     let id = String::deserialize(deserializer)?;
-    Spacecraft::of_id(&id).ok_or_else(|| D::Error::custom(format!("no spacecraft {id} is known")))
+    Spacecraft::of_id(&id).ok_or_else(|| D::Error::custom(format!("unknown spacecraft {id}")))
 }
 
 /// Names of an instrument in labels and ISIS image identifiers.

@@ -84,7 +84,7 @@ impl TiePoint<String> {
 /// A measurement belongs to an image that does not exist.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, Cause)]
 #[error(
-    "tie point {tie} is measured in image {image}, counted from 0; expected one of {images} images"
+    "tie point {tie} is measured in image {image}, counted from 0; expected an image below {images}"
 )]
 #[cause(Bug: "report this with the site's configuration and the log")]
 pub struct UnknownImage {
@@ -145,7 +145,7 @@ mod tests {
         assert_eq!(require_images(&ties, 2), Ok(()));
         assert_eq!(
             require_images(&ties, 1).unwrap_err().to_string(),
-            "tie point t1 is measured in image 1, counted from 0; expected one of 1 images"
+            "tie point t1 is measured in image 1, counted from 0; expected an image below 1"
         );
     }
 }

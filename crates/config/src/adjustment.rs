@@ -40,9 +40,9 @@ declare_table! {
         /// Control of the adjustment. The published model (Yoon & Shan 2004) is provided for comparison: image
         /// coordinates of footprints, computed from the orientations under adjustment, hold these orientations fixed.
         /// Along the track, the model agrees with the paper. Across the track, residuals refer to the line that sees
-        /// the point, whereas the paper uses the measured line. The mean across-track corrections of MOLA, 2.7 to 3.3
-        /// px in the paper, are therefore 0, and the standard deviation of unit weight is about half of the published
-        /// value.
+        /// the point, whereas the paper uses the measured line. The mean across-track corrections of footprints, 2.7 to
+        /// 3.3 px in the paper, are therefore 0, and the standard deviation of unit weight is about half of the
+        /// published value.
         model: AdjustmentModel = key(words_of(
             AdjustmentModel::WORDS,
             [
@@ -59,8 +59,9 @@ declare_table! {
         /// by up to 50 m (Shan et al. 2005), and orbit errors vary from revolution to revolution.
         position_sigma_m: [f64; 3] = key(SIGMAS_OF_TIME).or([25.0, 0.2, 0.0]),
         /// Standard deviations of the rotations about the camera axes for the powers 0, 1 and 2 of t, as in
-        /// `position_sigma_m`. The constant part, 0.4 mrad or 150 m on the ground, corresponds to the distances between
-        /// images of a pair, and the drifts to the attitude residuals.
+        /// `position_sigma_m`. The default of the constant term (0.4 mrad, or 150 m on the ground) corresponds to the
+        /// along-track distances between the images of a pair, and the defaults of the drift terms correspond to the
+        /// residuals of the attitude.
         rotation_sigma_rad as "rotation_sigma_arcsec": [f64; 3] = key(SIGMAS_OF_TIME)
             .or([82.5, 2.0, 2.0])
             .map(|sigmas| sigmas.map(|sigma| sigma * RADIANS_PER_ARCSECOND)),
@@ -75,11 +76,12 @@ declare_table! {
             RotationUnknowns::WORDS,
             ["", "constants", "constants and linear terms in t", "constants, linear and quadratic terms in t"],
         )).or(RotationUnknowns::Acceleration),
-        /// Standard deviation of a common delay of all lines of an image. Tie points cannot separate delay and pitch:
-        /// the delay is not an unknown, and `rotation_sigma_arcsec` accounts for both. The stated standard deviations
-        /// of camera positions along the track include the delay. 45 ms is half the disagreement between the images of
-        /// a pair (Shan et al. 2005, Table 5); 0 assumes exact line times. If `time_bias_sigma_ms`, `attitude_clock` or
-        /// `boresight_line_time_sigma_ms` is in use, it applies instead of this key.
+        /// Standard deviation of a common delay of all lines of an image. Tie points cannot separate this delay from
+        /// pitch: the delay is not an unknown, and `rotation_sigma_arcsec` accounts for both. The stated standard
+        /// deviations of camera positions along the track include the delay. The default, 45 ms, corresponds to half
+        /// the along-track disagreement between the images of a pair (Shan et al. 2005, Table 5); 0 assumes exact line
+        /// times. If `time_bias_sigma_ms`, `attitude_clock` or `boresight_line_time_sigma_ms` is used, it replaces this
+        /// key.
         line_time_sigma_s as "line_time_sigma_ms": f64 = key(SIGMA_OR_NONE)
             .or(45.0)
             .map(|milliseconds| milliseconds * SECONDS_PER_MS),
@@ -90,15 +92,15 @@ declare_table! {
         /// more than 100 m, the report and adjustment.json give both results.
         attitude_clock: bool = key(yes_or_no(
             "all images are equally likely to be in error",
-            "nadir-following images are in error, by one offset",
+            "nadir-following images are in error by one common offset",
         )).or(false),
-        /// File with the result that `areograph compare-readings --toml` printed for many pairs of images. It decides
-        /// `attitude_clock`: "yes" if the pairs support one offset, otherwise "no".
+        /// File with the result that `areograph compare-readings --toml` printed for many pairs of images. This result
+        /// decides `attitude_clock`: "yes" if the pairs support one offset, otherwise "no".
         readings: Option<ReadingsDecision> = key(DecisionFile).unused(r#""readings.toml""#),
         /// Standard deviation of the time offset of the attitudes (`attitude_clock`).
         attitude_clock_sigma_s: f64 = key(SIGMA).or(1.0),
-        /// Upper limit of the standard deviations of constant image rotations with `attitude_clock`: 0.1 mrad. A clock
-        /// offset explains nothing if the rotations alone may absorb the disagreement.
+        /// Upper limit of the standard deviations of constant image rotations with `attitude_clock`. The default
+        /// corresponds to 0.1 mrad. A clock offset explains nothing if the rotations alone can absorb the disagreement.
         attitude_clock_rotation_sigma_rad as "attitude_clock_rotation_sigma_arcsec": f64 = key(SIGMA)
             .or(20.6)
             .map(|sigma| sigma * RADIANS_PER_ARCSECOND),
@@ -107,26 +109,28 @@ declare_table! {
         /// orbits.
         orbit_of_pedr: bool = key(yes_or_no(
             "the orbit from the kernels",
-            "the orbit from the kernels, shifted by the mean distance to the PEDR orbit over the profile",
+            "the orbit from the kernels, shifted by its mean difference from the PEDR orbit over the profile",
         )).or(false),
-        /// Whether heights of tie points on slopes of the MOLA surface also determine the images in plan. This is
-        /// useful where, according to the report, relief determines the position to less than half of the a priori
-        /// standard deviation: on rough ground, with precise tie points, and with many profiles near them.
+        /// Whether heights of tie points on slopes of the MOLA surface also determine the plan positions of the images.
+        /// This is useful where, according to the report, relief determines the position with a standard deviation of
+        /// less than half the a priori value: on rough ground, with precise tie points, and with many profiles near
+        /// them.
         relief_for_plan: bool = key(yes_or_no(
             "slopes only increase the uncertainty of heights",
             "each profile may be offset in plan, and tie points shift until their heights fit",
         )).or(false),
         /// Whether the position of a laser spot in a simultaneous image is an observation: the mounting of camera and
-        /// laser on one bus determines this position, regardless of the attitude. The option requires profiles
-        /// simultaneous with the images, with positions known to `laser_surface.profile_plan_sigma_m`. Each profile may
-        /// then be offset in plan, and the laser boresight may differ from the altimeter file and the frame kernels.
+        /// laser on one bus determines this position, regardless of the attitude. The option requires profiles that are
+        /// simultaneous with the images and whose positions are known to `laser_surface.profile_plan_sigma_m`. Each
+        /// profile may then be offset in plan, and the laser boresight may differ from the altimeter file and the frame
+        /// kernels.
         common_bus: bool = key(yes_or_no(
             "footprints do not constrain the attitude",
             "the mounting determines the position of a footprint in the simultaneous image",
         )).or(false),
-        /// Standard deviation of the two boresight angles of the laser, which apply to all images: 0.1 mrad. No
-        /// alignment has been published with a standard deviation; the narrow-angle camera was aligned with the
-        /// altimeter in flight (Kirk et al. 2001).
+        /// Standard deviation of the two boresight angles of the laser, which apply to all images. The default
+        /// corresponds to 0.1 mrad. No alignment has been published with a standard deviation; the narrow-angle camera
+        /// was aligned with the altimeter in flight (Kirk et al. 2001).
         boresight_sigma_rad as "boresight_sigma_arcsec": f64 = key(SIGMA_OR_NONE)
             .or(20.6)
             .map(|sigma| sigma * RADIANS_PER_ARCSECOND),
@@ -148,17 +152,18 @@ declare_table! {
                 "projected with the adjusted orientation, without weight, degrees of freedom or covariance",
             ],
         )).unused(r#""off""#).was("mola_image"),
-        /// Standard deviations of the image coordinates of footprints, along and across the track, in the focal plane:
-        /// one MOLA shot spacing (325 m at 4.4 m per pixel), and 4; Yoon & Shan 2004 give none.
+        /// Standard deviations of the image coordinates of footprints, along and across the track, in the focal plane.
+        /// The defaults are one MOLA shot spacing along the track (325 m at 4.4 m per pixel) and 4 px across it; Yoon &
+        /// Shan 2004 state none.
         footprint_sigma_px: [f64; 2] = key(SIGMAS).or([74.0, 4.0]).was("mola_sigma_px"),
-        /// Margin around an image within which a footprint still counts as inside this image.
+        /// Margin around an image within which a footprint is still counted as inside the image.
         footprint_margin_px: f64 = key(from_to(0.0, 1e4)).or(200.0).was("mola_margin_px"),
         /// Standard deviation of footprint coordinates (Yoon & Shan 2004).
         ground_sigma_m: f64 = key(SIGMA).or(10.0),
-        /// Standard deviation of ranges (Yoon & Shan 2004; instrument: 7 m at 400 km).
+        /// Standard deviation of ranges (Yoon & Shan 2004, where the uncertainty of the instrument is 7 m at 400 km).
         range_sigma_m: f64 = key(SIGMA).or(10.0),
         /// Standard deviation of the range bias of each profile, an unknown of the adjustment; 0 omits this unknown.
-        /// Biases of up to 25 m occur off nadir (Shan et al. 2005, Table 3). The default is 30, or 0 in the published
+        /// Biases of up to 25 m occur off nadir (Shan et al. 2005, Table 3). The default is 30 m, or 0 in the published
         /// model.
         range_bias_sigma_m: Option<f64> = key(SIGMA_OR_NONE).unused("30.0"),
         /// Standard deviation of the time bias of each image, an unknown of the adjustment; 0 omits this unknown.

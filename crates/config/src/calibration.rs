@@ -75,8 +75,9 @@ impl Document for CalibrationConfig {
 # Calibration of the lines of a camera with `areograph calibrate`: every key with its unit, range and default.
 #
 # Only `calibration`, two [[cameras]] and [ties] are required; an omitted key has the default given here.
-# Without [control], absolute pointing is not determined, and the result is marked invalid. If every camera has
-# `pixels`, ties.match and [laser] can replace tables of points. Relative paths are relative to the folder of this file.
+# Without laser points ([control] or [laser]), absolute pointing is not determined, and the result is marked invalid.
+# If every camera has `pixels`, ties.match and [laser] can replace tables of points.
+# Relative paths are relative to the folder of this file.
 # Schema: ../schema/calibration.schema.json
 
 ";
@@ -148,7 +149,7 @@ fn from_pixels(written: &CalibrationConfig, keys: &mut Keys<'_, '_>) {
             keys.review().refuse(
                 span,
                 key,
-                "no table of points: with ties.match, points are measured in pixels",
+                "no table of points: with ties.match, points are measured in the images",
             );
         }
     }
@@ -159,12 +160,13 @@ declare_table! {
     pub struct CameraConfig {
         /// Name of the line in tables of points.
         id: String = key(identifier()).required().example(r#""s1""#),
-        /// Image support data (ISD) of the line, as written by ALE: the calibration starts from their mounting, focal
-        /// length and pixels. `instrument_pointing` of all cameras must end in one frame, the spacecraft frame, from
-        /// which `constant_rotation` leads to each camera.
+        /// Image support data (ISD) of the line, as written by ALE: the calibration starts from the mounting, focal
+        /// length and detector geometry given there. The rotations `instrument_pointing` of all cameras must end in the
+        /// same frame, that of the spacecraft, from which `constant_rotation` leads to each camera.
         #[serde(skip)]
         isd: PathBuf = key(FILE).required().example(r#""isd/s1.json""#),
-        /// Pixels of the whole image: a greyscale TIFF or PNG of one band, or a cube. Only for ties.match.
+        /// File with the pixels of the whole image: a greyscale TIFF or PNG of one band, or a cube. Only for
+        /// ties.match.
         #[serde(skip)]
         pixels: Option<PathBuf> = key(FILE).unused(r#""images/s1.tif""#),
     }
@@ -213,7 +215,7 @@ declare_table! {
         /// Paths or globs of PEDR files.
         #[serde(skip)]
         files: Vec<PathBuf> = key(Globs(PEDR_ENDINGS)).or(Vec::new()).unused(r#"["pedr/*.b"]"#),
-        /// Edge of a cell of the terrain model, metres; at least one pixel.
+        /// Edge of a cell of the terrain model, metres; at least the ground size of one pixel.
         cell_m: Option<f64> = key(above_to(0.0, 1e5)).unused("100.0"),
         /// Search radius for the shift of a unit of shots, cells: the largest possible error of orbit and mounting.
         search_cells: u32 = key(whole_from_to(1, 500)).or(70),
@@ -223,10 +225,10 @@ declare_table! {
         least_variance_m2: f64 = key(above_to(0.0, 1e9)).or(1_000.0),
         /// Similarity to the terrain model that a unit of shots must exceed.
         least_score: f64 = key(from_to(0.01, 0.999)).or(0.9),
-        /// Largest root mean square of model minus laser heights at shots withheld from the search, without bias,
+        /// Largest root mean square of model minus laser heights, bias removed, at shots withheld from the search,
         /// metres.
         limit_m: f64 = key(above_to(0.0, 1e5)).or(60.0),
-        /// Random seed for the clusters of shots and the withheld ground.
+        /// Random seed for the clustering of shots and the choice of withheld ground.
         seed: u32 = key(whole_from_to(0, u32::MAX)).or(1),
         /// Maximum number of rounds; a calibration that has not converged after these rounds is invalid.
         rounds_max: u32 = key(whole_from_to(1, 100)).or(10),
@@ -262,10 +264,10 @@ declare_table! {
         /// Standard deviation of measured lines and samples, if missing from the table.
         sigma_px: f64 = key(from_to(SIGMA_MIN, 100.0)).or(1.0),
         /// Standard deviation of a horizontal coordinate of a laser point, if missing from the table; the default
-        /// applies to MOLA profiles. With `ties.match`, the uncertainty of matching is added. Beyond the permitted
-        /// range, the ground departs from the plane in which errors are computed.
+        /// applies to MOLA profiles. With `ties.match`, the uncertainty of matching is added. For larger values than
+        /// those permitted, the ground departs from the plane in which errors are computed.
         sigma_horizontal_m: f64 = key(from_to(SIGMA_MIN, CONTROL_SIGMA_MAX_M)).or(100.0),
-        /// Standard deviation of the radius of a laser point, under the conditions of `sigma_horizontal_m`.
+        /// Standard deviation of the radius of a laser point, used under the same conditions as `sigma_horizontal_m`.
         sigma_vertical_m: f64 = key(from_to(SIGMA_MIN, CONTROL_SIGMA_MAX_M)).or(10.0),
         /// Interval n of withheld control: every n-th control point along the flight is withheld for validation; with
         /// `ties.match`, all shots in every n-th 5 km by 10 km rectangle on the ground.
@@ -280,8 +282,9 @@ declare_table! {
     /// A priori standard deviations. `orbit_bias_m`, `orbit_drift_m_per_line` and `angle_deg` are from Li et al. 2023,
     /// Table 2.
     pub struct APrioriConfig {
-        /// Standard deviation of an orbit coordinate. Its error is not estimated, because the offset angles of the
-        /// camera absorb it. Together with `angle_deg`, this key limits the shift of the image by a calibration.
+        /// Standard deviation of an orbit coordinate. The error of the coordinate is not estimated, because the offset
+        /// angles of the camera absorb it. Together with `angle_deg`, this key limits the shift of the image by a
+        /// calibration.
         orbit_bias_m: f64 = key(from_to(1e-3, 1e5)).or(1_000.0),
         /// Standard deviation of the drift of an orbit coordinate per image line.
         orbit_drift_m_per_line: f64 = key(from_to(1e-6, 10.0)).or(0.01),
@@ -308,7 +311,7 @@ declare_table! {
             (
                 "as_published",
                 CalibrationMode::AsPublished,
-                "all angles of all cameras; tie points determine some combinations weakly or not at all: the camera may drift",
+                "all angles of all cameras; tie points determine some of their combinations weakly or not at all",
             ),
         ])).or(CalibrationMode::Differential),
         /// Order of the look angle polynomials.

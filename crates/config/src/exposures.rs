@@ -64,7 +64,8 @@ impl ExposureRows {
             found.refuse(
                 review,
                 format!(
-                    "a row whose first number is a line: a whole number from 0 below {LINES_MAX}"
+                    "a row whose first number is a line: a whole number from 0 to {}",
+                    LINES_MAX - 1
                 ),
             );
             return None;

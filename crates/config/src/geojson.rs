@@ -51,9 +51,9 @@ pub(super) enum RingError {
     #[error("spans {0} degrees of longitude; expected less than 360")]
     Wide(f64),
     #[error(
-        "position {0}: longitude changes from {1} to {2} in one edge; expected at most 180 degrees. Insert positions, or cross \
-         180 degrees with a ring narrower than 90 degrees with longitudes within -180 to 180, and 0 degrees with negative \
-         longitudes"
+        "position {0}: longitude changes from {1} to {2} in one edge; expected at most 180 degrees. Insert positions. \
+         A ring across 180 degrees may instead have longitudes from -180 to 180 if it is narrower than 90 degrees, and a \
+         ring across 0 degrees may have negative longitudes"
     )]
     WideEdge(usize, f64, f64),
 }
@@ -298,10 +298,9 @@ mod tests {
             ),
             (
                 "[[0,-5],[200,-5],[200,5],[0,5],[0,-5]]",
-                "polygon 1 ring 1 position 2: longitude changes from 0 to 200 in one edge; expected at most 180 degrees. Insert \
-                 positions, or cross 180 degrees with a ring narrower than 90 degrees with longitudes within -180 to 180, and \
-                 0 degrees with \
-                 negative longitudes",
+                "polygon 1 ring 1 position 2: longitude changes from 0 to 200 in one edge; expected at most \
+                 180 degrees. Insert positions. A ring across 180 degrees may instead have longitudes from -180 to 180 \
+                 if it is narrower than 90 degrees, and a ring across 0 degrees may have negative longitudes",
             ),
             (
                 "[[-180,0],[180,0],[1,1],[-180,0]]",

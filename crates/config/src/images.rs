@@ -31,8 +31,8 @@ const DETECTORS_MAX: u32 = 8_192;
 /// Images of a site.
 pub(super) const IMAGES: Many = Many {
     further: &[&[
-        " Without a label or support data, required keys are `sclk_start` or `utc_start`, `exposure_ms` or",
-        " `line_period_ms` (or `exposures` for all of these), `downtrack_summing`, `lines_header` and `samples`.",
+        " Without a label or support data, the required keys are `downtrack_summing`, `lines_header`, `samples`, and",
+        " either `exposures` or a start (`sclk_start` or `utc_start`) with `exposure_ms` or `line_period_ms`.",
     ]],
     ..Many::ANY
 };
@@ -74,26 +74,27 @@ declare_table! {
         /// the cube in `pixels` as well.
         #[serde(skip)]
         cube: Option<PathBuf> = key(FILE).unused(r#""../cubes/E0201461.cub""#),
-        /// Whether the spacecraft of the support data carries the laser, and the positions in the support data are
+        /// Whether the spacecraft of the support data carries the laser and its positions in the support data are
         /// geometric. These positions are then used for the ranges of shots fired during the exposure of the image.
         /// Only with support data.
         has_laser: bool = key(Switch).or(false).unused("true"),
         /// Camera of the image: `moc_na`, `moc_wa_red`, `moc_wa_blue`; a line of HRSC on Mars Express (`hrsc_nd`,
-        /// `hrsc_s1`, `hrsc_s2`, `hrsc_p1`, `hrsc_p2`, `hrsc_ir`, `hrsc_gr`, `hrsc_bl`, `hrsc_re`), required with HRSC
-        /// labels; or the path of an instrument file as in `config/instruments`. The default is the MOC camera that the
-        /// label names or, without a label, `moc_na`. The spacecraft of the camera determines clock, orbit and
-        /// attitude.
+        /// `hrsc_s1`, `hrsc_s2`, `hrsc_p1`, `hrsc_p2`, `hrsc_ir`, `hrsc_gr`, `hrsc_bl`, `hrsc_re`); or the path of an
+        /// instrument file as in `config/instruments`. The key is required with HRSC labels. Otherwise, the default is
+        /// the MOC camera that the label names or, without a label, `moc_na`. The spacecraft of the camera determines
+        /// clock, orbit and attitude.
         instrument: Option<Instrument> = key(CAMERA).example(r#""moc_na""#),
-        /// Name of the image in tie point files and in files for ISIS. The default is the identifier in tie point files,
-        /// and the serial number that ISIS composes from the label, where it is known, in networks and files for ISIS.
-        /// The clock reading of a serial number must agree with the image.
+        /// Name of the image in tie point files and in files for ISIS. In tie point files, the default is the
+        /// identifier; in networks and files for ISIS, it is the serial number that ISIS composes from the label, where
+        /// this number is known. The clock reading of a serial number must agree with the image.
         serial_number: Option<String> =
             key(text()).example(r#""MGS/651158134:116/MOC-NA""#),
-        /// Line times of an image with changing exposure, as with HRSC. Each piece has its first line, counted from 0,
-        /// the start of that line in ephemeris time (TDB seconds past J2000), and the line period in milliseconds. ISIS
-        /// stores line times in the table `LineScanTimes` (lines counted from 1), ALE in `line_scan_rate` (seconds from
-        /// `center_ephemeris_time`). Requires `lines_header`; excludes `exposure_ms` and `line_period_ms`. A separate
-        /// start time must agree with the pieces, and a gap of more than half a line between two pieces is reported.
+        /// Line times of an image with changing exposure, as with HRSC. Each piece consists of its first line (counted
+        /// from 0), the start of that line in ephemeris time (TDB seconds past J2000), and the line period in
+        /// milliseconds. ISIS stores line times in the table `LineScanTimes` (lines counted from 1), ALE in
+        /// `line_scan_rate` (seconds from `center_ephemeris_time`). Requires `lines_header`; excludes `exposure_ms` and
+        /// `line_period_ms`. A separate start time must agree with the pieces, and a gap of more than half a line
+        /// between two pieces is reported.
         exposures: Option<Vec<ExposurePiece>> = key(ExposureRows)
             .unused("[[0, 255744599.027482, 12.800791], [6665, 255744684.345045, 13.227428]]"),
         /// Keys written in the configuration.
@@ -126,10 +127,10 @@ declare_table! {
     /// Parameters of an image in the configuration.
     fill ImageFields {
         /// Spacecraft clock at the start of the first line, seconds:ticks with 256 ticks per second (":28" and ":028"
-        /// are both 28/256 s). Preferred over UTC, which is rounded in labels, with errors of 1.0 to 4.8 ms in five
-        /// labels. A difference of more than 20 ms between clock and UTC is reported, and a difference of more than 1 s
-        /// is refused. Not for Mars Express, because clock readings in its labels differ by seconds from its clock
-        /// kernels.
+        /// are both 28/256 s). Preferred over UTC, which is rounded in labels (errors of 1.0 to 4.8 ms were found in
+        /// five labels). A difference of more than 20 ms between clock and UTC is reported, and a difference of more
+        /// than 1 s is refused. Not for Mars Express, because clock readings in its labels disagree with its clock
+        /// kernels by seconds.
         sclk_start = key(matching(
             CLOCK_STRING,
             "^(1/)?[0-9]+[:.][0-9]+$",
@@ -151,8 +152,8 @@ declare_table! {
         downtrack_summing = key(SUMMING).example_in(1, "8"),
         /// Number of detector pixels summed across the track.
         crosstrack_summing = key(SUMMING).example_in(1, "8"),
-        /// Number of exposed lines according to the image header, for the time model; the exposure of all lines takes
-        /// less than 600 s.
+        /// Number of exposed lines according to the image header, for the time model; the exposure of all lines must
+        /// take less than 600 s.
         lines_header = key(whole_from_to(IMAGE_LINES_MIN, LINES_MAX)).example_in(1, "1536"),
         /// Number of lines in the delivered file, if fewer than were exposed.
         lines_delivered = key(whole_from_to(1, LINES_MAX)).example_in(1, "1536"),
@@ -207,9 +208,9 @@ fn is_complete(image: &ImageConfig, keys: &mut Keys<'_, '_>) {
             keys.refuse("cube", "either support data (isd) or a cube, not both");
         }
         let why = if support[0] {
-            "the support data of images.isd give all of these"
+            "the support data of images.isd replace this key"
         } else {
-            "the label and tables of images.cube give all of these"
+            "the label and tables of images.cube replace this key"
         };
         let of_label = ["label", "instrument"].into_iter();
         for key in of_label.chain(OF_FIELDS) {
@@ -244,7 +245,7 @@ fn of_spacecraft(image: &ImageConfig, keys: &mut Keys<'_, '_>) {
     let of = &spacecraft.full_name;
     if !spacecraft.labels_tell_clock {
         let expected = format!(
-            "utc_start or exposures instead: clock readings in {of} labels differ by seconds from the clock kernels"
+            "utc_start or exposures instead: clock readings in {of} labels disagree with the clock kernels by seconds"
         );
         keys.refuse("sclk_start", expected);
     }
@@ -313,7 +314,7 @@ fn line_period(fields: &ImageFields, keys: &mut Keys<'_, '_>) {
         keys.refuse(
             "line_period_ms",
             format!(
-                "exposure_ms × downtrack_summing = {expected_ms:.4}, or only one of these keys"
+                "exposure_ms × downtrack_summing = {expected_ms:.4}, or only one of exposure_ms and line_period_ms"
             ),
         );
     }

@@ -246,7 +246,7 @@ fn ck_bias_s(
     let max_s = spacecraft.ck_bias_max_s;
     if bias_s.abs() > max_s {
         let expected = if max_s > 0.0 {
-            format!("at most {max_s}")
+            format!("-{max_s} to {max_s}")
         } else {
             "0: the attitude kernels need no time correction".to_owned()
         };

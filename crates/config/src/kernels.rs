@@ -48,7 +48,7 @@ declare_table! {
 declare_table! {
     /// The source of the kernel list.
     struct SourceKeys {
-        /// SPICE metakernel; relative paths in this file are relative to its folder.
+        /// SPICE metakernel; relative paths in the metakernel are relative to its folder.
         metakernel: Option<PathBuf> = key(FILE).example(r#""../kernels/scene.tm""#),
         /// Alternatively, kernels in load order, as plain paths without wildcards; later kernels take precedence.
         files: Option<Vec<PathBuf>> = key(list(FILE).each_once("each kernel once"))
@@ -70,7 +70,7 @@ declare_table! {
         ])).each_once("each quality once"))
             .or(vec![CkQuality::Reconstructed, CkQuality::Nominal])
             .unused(r#"["reconstructed", "nominal"]"#),
-        /// Kernels pinned by file name; the latest version of other kernels is used. With `root`.
+        /// Kernels pinned by file name; of all other kernels, the latest version is used. With `root`.
         pinned: Vec<String> = key(list_or_none(matching(
             "file names without folders",
             r"^[^/\\]+$",
@@ -99,7 +99,7 @@ fn one_source(_: &SourceKeys, keys: &mut Keys<'_, '_>) {
     }
     if keys.span_of("root").is_none() {
         for key in OF_ROOT {
-            keys.unused(key, "it belongs to kernels.root");
+            keys.unused(key, "it applies only with kernels.root");
         }
     }
 }
@@ -144,7 +144,7 @@ declare_table! {
 declare_table! {
     /// Kernels of a set.
     struct ListKeys {
-        /// SPICE metakernel; relative paths in this file are relative to its folder.
+        /// SPICE metakernel; relative paths in the metakernel are relative to its folder.
         metakernel: Option<PathBuf> = key(FILE).unused(r#""../kernels/nav.tm""#),
         /// Alternatively, kernels in load order, as plain paths without wildcards; later kernels take precedence.
         files: Option<Vec<PathBuf>> = key(list(FILE).each_once("each kernel once"))

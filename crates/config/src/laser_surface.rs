@@ -23,8 +23,9 @@ declare_table! {
         /// error becomes a height error. The default combines 110 m for the images and 70 m for MOLA.
         plan_sigma_m: f64 = key(zero_or(1e-3, 1e5)).or(SurfaceOptions::default().plan_sigma_m),
         /// Standard deviation of the plan position of a profile, per axis (100 m horizontally for MOLA, Neumann et al.
-        /// 2001). The stated accuracies of footprints include this value, which the test for misplaced profiles uses and
-        /// which weights profiles where `adjustment.relief_for_plan` or `adjustment.common_bus` is "yes".
+        /// 2001). The stated accuracies of footprints include this value. It is also used in the test for misplaced
+        /// profiles and, where `adjustment.relief_for_plan` or `adjustment.common_bus` is "yes", as the a priori
+        /// standard deviation of the shift of a profile.
         profile_plan_sigma_m: f64 = key(from_to(1e-3, 1e5)).or(70.0),
         /// Lower limit of the roughness estimated from the shots: root mean square difference of heights 300 m apart.
         roughness_min_m: f64 = key(from_to(0.01, 1e4)).or(SurfaceOptions::default().roughness_min_m),

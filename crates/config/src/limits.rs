@@ -8,11 +8,11 @@ use super::{
 };
 
 declare_table! {
-    /// Limits of shots, tie points, adjustment and terrain model, which decide whether a site is valid. Independent
+    /// Limits on shots, tie points, adjustment and terrain model, which decide whether a site is valid. Independent
     /// data are checked first: heights above the MOLA surface, then the agreement between images.
     pub struct LimitsConfig: Deserialize {
-        /// Largest share of missing shots in a profile; above this limit, most of the profile is interpolated, and the
-        /// site receives a remark.
+        /// Largest share of missing shots in a profile; above this limit, the site receives a remark, because much of
+        /// the profile is interpolated.
         missing_shots_max: f64 = key(from_to(0.0, 1.0)).or(0.5),
         /// Largest |median| height of tie points above the MOLA surface before the adjustment. The a priori height of a
         /// pair is known to about 500 m; the default is five times this value.
@@ -20,20 +20,20 @@ declare_table! {
         /// Largest |median| height of tie points above the MOLA surface after the adjustment, unless the median is
         /// within three of its own standard deviations.
         height_after_max_m: f64 = key(above_to(0.0, 1e6)).or(10.0),
-        /// Largest share of tie points more than 3.29 of their standard deviations from the MOLA surface.
+        /// Largest share of tie points that are more than 3.29 of their standard deviations from the MOLA surface.
         height_outliers_max: f64 = key(from_to(0.0, 1.0)).or(0.1),
         /// Largest mean difference between the surfaces of single profiles at the tie points, in units of its standard
         /// deviation: contradictory profiles provide no control.
         profiles_apart_max_sigma: f64 = key(above_to(0.0, 1000.0)).or(4.0),
-        /// Largest correction of an image's position or pointing by the adjustment, in units of its standard deviation.
-        /// Up to 1.5 times this limit, drift and bend of the attitude cause only a remark, because tie points determine
-        /// them.
+        /// Largest correction of an image's position or pointing by the adjustment, in units of its a priori standard
+        /// deviation. Up to 1.5 times this limit, drift and bend of the attitude cause only a remark, because tie
+        /// points determine them.
         correction_max_sigma: f64 = key(above_to(0.0, 1000.0)).or(4.0),
-        /// Largest distance along the flight between two images at their tie points before the adjustment. Shan et
-        /// al. 2005 find 225 to 271 m; the default corresponds to the rotation of the attitude in 3 s.
+        /// Largest along-track parallax of two images at their tie points before the adjustment. Shan et al. 2005 found
+        /// 225 to 271 m; the default corresponds to the rotation of the attitude in 3 s.
         parallax_before_max_m: f64 = key(above_to(0.0, 1e6)).or(1000.0),
-        /// Largest distance along the flight between two images at their tie points after the adjustment: six MOC lines
-        /// at the usual spacing of 4 m.
+        /// Largest along-track parallax of two images at their tie points after the adjustment: six MOC lines at the
+        /// usual spacing of 4 m.
         parallax_after_max_m: f64 = key(above_to(0.0, 1e6)).or(25.0),
         /// Largest standard deviation of unit weight of the tie points along and across the track.
         sigma0_max: f64 = key(above_to(0.0, 1000.0)).or(1.5),

@@ -114,8 +114,9 @@ declare_table! {
         files: Vec<PathBuf> = key(Globs(&["csv"]))
             .required_as("paths or globs of tables of controls")
             .example(r#"["controls.csv"]"#),
-        /// Standard deviation of a control coordinate, including its measurement, if missing from the table. Without
-        /// this key, it is estimated from the residuals of SCALE at the controls.
+        /// Standard deviation of a control coordinate, including the uncertainty of its measurement in the pictures, if
+        /// missing from the table. Without this key, this standard deviation is estimated from the residuals of SCALE
+        /// at the controls.
         sigma_m: Option<f64> = key(above_to(0.0, 1e7)).unused("2000.0"),
         /// Residual, in standard deviations of SCALE, beyond which a control is rejected. Two blunders that mask each
         /// other are also detected, by least median of squares; fewer than five controls cannot be tested.
@@ -127,7 +128,7 @@ declare_table! {
     /// A priori data of the pictures. Without this table, the measurements define the pictures.
     pub struct PicturesConfig {
         /// Paths or globs of tables (.csv), one row per picture: `picture` and, where known, `brick` (name of the
-        /// brick) and `metres_per_unit` (size of a coordinate unit on the ground). The size tests the scale of the
+        /// brick) and `metres_per_unit` (size of a coordinate unit on the ground). This size tests the scale of the
         /// controls: if the adjusted size differs by more than 2 %, the net is invalid.
         #[serde(skip)]
         files: Vec<PathBuf> = key(Globs(&["csv"])).or(Vec::new()).unused(r#"["pictures.csv"]"#),
@@ -147,7 +148,7 @@ declare_table! {
 }
 
 declare_table! {
-    /// Map: pictures are fitted by similarities to a conformal projection of a sphere.
+    /// Map: pictures are fitted by similarity transformations to a conformal projection of a sphere.
     pub struct MapConfig {
         /// The projection.
         map: ConformalMap = group::<MapKeys>().map(MapKeys::map),
@@ -155,7 +156,7 @@ declare_table! {
 }
 
 declare_table! {
-    /// Map: pictures are fitted by similarities to a conformal projection of a sphere.
+    /// Map: pictures are fitted by similarity transformations to a conformal projection of a sphere.
     struct MapKeys {
         /// The projection.
         projection: Projection = key(words([
@@ -195,11 +196,12 @@ fn mercator_has_an_equator(map: &MapKeys, keys: &mut Keys<'_, '_>) {
 }
 
 declare_table! {
-    /// Solution of the net, with the programs of Arthur & McMacken 1977.
+    /// Solution of the net, after the programs of Arthur & McMacken 1977.
     pub struct TriangulationConfig {
         /// Method that positions the pictures on the map.
         method: Method = key(words([
-            ("scale", Method::Scale, "BRICK, EXTEND, SCALE: bricks keep their shapes, which may be bent where ties are few"),
+            ("scale", Method::Scale, "BRICK, EXTEND, SCALE: bricks keep their shapes, which may be distorted where \
+                ties are few"),
             ("mortar", Method::Mortar, "BRICK, EXTEND, MORTAR, SCALE: weighted adaptation of bricks to the controls"),
             ("one_shot", Method::OneShot, "weighted adjustment of all pictures and controls at once"),
         ])).or(Method::OneShot),
@@ -207,14 +209,14 @@ declare_table! {
         local: bool = key(yes_or_no("seams remain unchanged", "pictures of a brick adapt to neighbouring bricks")).or(false),
         /// Number of pictures in a brick, if the table of pictures names no bricks.
         brick_pictures: u32 = key(whole_from_to(2, 100)).or(8),
-        /// Treatment of blunders: measurements whose standardised deviation in the adjustment of the whole net exceeds a
-        /// limit. By chance, the largest deviation exceeds this limit in one of a hundred nets.
+        /// Treatment of blunders: measurements whose standardised deviation in the adjustment of the whole net exceeds
+        /// a limit. In one of a hundred nets without blunders, the largest deviation exceeds this limit by chance.
         blunders: Blunders = key(words([
             ("remove", Blunders::Remove, "rejected and reported"),
             ("report", Blunders::Report, "flagged and used"),
         ])).or(Blunders::Remove),
-        /// Standard deviation of a measured coordinate on the map. If missing, it is estimated from the deviations in
-        /// bricks.
+        /// Standard deviation of a measured coordinate on the map. Without this key, it is estimated from the
+        /// deviations within bricks.
         tie_sigma_m: Option<f64> = key(above_to(0.0, 1e7)).unused("50.0"),
     }
     check seams_need_bricks
@@ -224,7 +226,7 @@ fn seams_need_bricks(written: &TriangulationConfig, keys: &mut Keys<'_, '_>) {
     if written.method == Method::OneShot && written.local {
         keys.refuse(
             "local",
-            "no, or method = \"scale\": one_shot has no bricks whose seams could be evened out",
+            "\"no\", or method = \"scale\": one_shot has no bricks whose seams could be evened out",
         );
     }
 }

@@ -17,7 +17,7 @@ declare_table! {
         /// al. 2005; a second-order polynomial requires at least four epochs to leave residuals.
         intervals: u32 = key(whole_from_to(3, 10_000)).or(30),
         /// Origin of straight rays to the ground: one convention for all camera positions. Files for ISIS and ALE, in
-        /// `exchange/centre`, follow the convention of these programs in every run. For every image, the distances to the
+        /// `exchange/centre`, follow the convention of these programs in every run. For every image, the effects of the
         /// other conventions are reported. Ranges are always geometric.
         light_time: LightTime = key(words_of(LightTime::WORDS, [
             "camera position when the light left the ground: light time to the surface and aberration",
@@ -40,7 +40,7 @@ declare_table! {
     pub struct RegistrationConfig: Deserialize {
         /// Orientation model for the projection of points. Without this key, each image uses `rotation_vector` if this
         /// model is within the limits of `[orientation]`, and `samples` otherwise, with a remark. `registration.json`
-        /// and the report state the distances between the model in use and the other models.
+        /// and the report state the differences between the model in use and the other models.
         model: Option<CameraModel> = key(words_of(CameraModel::WORDS, [
             "first-order polynomials of positions and angles (Shan, Lee & Yoon 2002)",
             "second-order polynomials (Shan et al. 2005); angles are poorly determined near the equator",
@@ -48,7 +48,7 @@ declare_table! {
             "interpolation between the samples, without a polynomial over the whole image",
         ])).unused(r#""samples""#),
         /// Convergence limit of the two published iterations. The default is the published limit. The iterations run in
-        /// addition to Newton's method, which computes the product.
+        /// addition to Newton's method, which computes the coordinates of the products.
         // Below, steps drown in the rounding of coordinates: 1e-9 m of 4e6 m, lines of metres.
         tolerance_lines: f64 = key(from_to(1e-6, 100.0)).or(0.1),
         /// Maximum number of steps of the two published iterations. The default is not from a publication.

@@ -20,9 +20,9 @@ declare_table! {
     /// PEDR files. Without this table, images are oriented, but there are no footprints and no range check.
     pub struct PedrConfig: Deserialize {
         /// Paths, folders or globs of PEDR files. A folder stands for all files `*.b` in it and its subfolders. A glob
-        /// has `*`, `?`, `[..]` in at most three parts of the path; `**` is not accepted, and letter case is
-        /// significant. A path that matches no file is refused. Every shot is counted
-        /// once: a copy of a file is read once, and two versions of one orbit are refused.
+        /// may contain `*`, `?` and `[..]` in at most three parts of the path; `**` is not accepted, and letter case is
+        /// significant. A path that matches no file is refused. Every shot is counted once: a copy of a file is read
+        /// once, and two versions of one orbit are refused.
         #[serde(skip)]
         files: Vec<PathBuf> = key(Globs(PEDR_ENDINGS))
             .required_as("paths or globs of PEDR files (or no table [pedr] at all)")
@@ -31,7 +31,8 @@ declare_table! {
         /// IAU 1991 and IAU 1994 differ by 0.033 degrees of longitude, 1.96 km at the equator; pck00006, which Shan et
         /// al. 2005 call IAU 1991, contains the 1994 constants.
         datum: DatumChoice = key(words([
-            ("auto", DatumChoice::Auto, "from the version letter and the label: L is IAU 2000, and older versions are IAU 1991"),
+            ("auto", DatumChoice::Auto, "from the version letter and the label: version L refers to IAU 2000, and older \
+                versions to IAU 1991"),
             ("iau1991", DatumChoice::Stated(Datum::Iau1991), ""),
             ("iau1994", DatumChoice::Stated(Datum::Iau1994), ""),
             ("iau2000", DatumChoice::Stated(Datum::Iau2000), ""),
@@ -52,9 +53,9 @@ declare_table! {
         /// Accepted trigger channels. (The grids of the MOLA team exclude channel 4.)
         channels = key(list(whole_from_to(ShotFilter::CHANNELS[0], ShotFilter::CHANNELS[1]))).or(vec![1, 2, 3, 4]).map(sorted),
         /// Accepted attitude flags. With flag 2 (attitude missing for part of the frame) or 3 (for the whole frame),
-        /// the footprint assumes nadir pointing and may be 100 km in error off nadir; the MOLA surface treats these
-        /// profiles as four times as uncertain. Flag 1 has no published meaning. In files before 1998-10 the field is
-        /// undefined: list the values found in these files.
+        /// the footprint was computed for nadir pointing and may be in error by 100 km off nadir; the MOLA surface
+        /// quadruples the standard deviations of the shifts of these profiles. Flag 1 has no published meaning. In
+        /// files from before October 1998, the field is undefined: list the values found in these files.
         attitude_flags = key(list(whole_from_to(u16::MIN, u16::MAX))).or(vec![0, 1]).map(sorted),
         /// Largest off-nadir angle of the laser. The default keeps all shots, because images are also taken off nadir:
         /// Shan et al. 2005, Table 2, list emission angles of up to 22.1 degrees. (The grids of the MOLA team are

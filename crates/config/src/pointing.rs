@@ -29,8 +29,8 @@ declare_table! {
         /// Time correction of attitude kernels: the attitude of an exposure at t is read at t + `ck_bias_s`. Position,
         /// Mars rotation and mounting refer to t. The default is the bias in the instrument file. For MOC, value and
         /// sign are known from ISIS, ALE (`INS-94031_CK_TIME_BIAS`) and Shan et al. 2005. The known value with reversed
-        /// sign is refused; any other value is reported in a remark. It is unknown whether the same value applies to
-        /// kernels before the mapping phase (before April 1999).
+        /// sign is refused; any other departure from the known value is reported in a remark. It is unknown whether the
+        /// same value applies to kernels from before the mapping phase (before April 1999).
         ck_bias as "ck_bias_s": Option<PointingBias> = key(from_to(-10.0, 10.0))
             .unused("-1.15")
             .map(|bias_s| bias_s.map(PointingBias::from_seconds)),
@@ -124,10 +124,10 @@ impl PointingConfig {
 }
 
 declare_table! {
-    /// Clock bias of MOLA. Shan et al. 2005 (data preparation, citing NAIF 2001) corrected this bias. Its sign is
-    /// unknown, as are the versions of PEDR time tags (if any) that already include the bias. The defaults are
+    /// Clock bias of MOLA. Shan et al. 2005 (data preparation, citing NAIF 2001) corrected this bias. The sign of the
+    /// bias is unknown, as are the PEDR versions (if any) whose time tags have already been corrected. The defaults are
     /// therefore a choice of areograph; the bias scan of the range check shows which choice a profile supports. The
-    /// effect is about one shot spacing (353 to 398 m) along the track, 28 m of Mars rotation at the equator, and at
+    /// effect is 353 to 398 m along the track (about one shot spacing), 28 m of Mars rotation at the equator, and at
     /// most 3.2 m in height.
     fill MolaClock {
         /// Size of the clock bias; the default is the bias in the altimeter file.

@@ -16,19 +16,19 @@ declare_table! {
     pub struct RangeCheckConfig: Deserialize, JsonSchema {
         /// Largest |mean| of range minus distance. The default is a choice of areograph: Shan et al. 2005 state no
         /// limit, and the profiles in their Table 3 reach 2 m at nadir and 25.4 m off nadir. Off nadir, `orbit_max_m`
-        /// times the sine of the off-nadir angle is added.
+        /// times the sine of the off-nadir angle is added to this limit.
         mean_max_m: f64 = key(above_to(0.0, 1e6)).or(10.0),
         /// Distance from the median, in robust standard deviations, beyond which a shot is an outlier. The default is a
         /// choice of areograph; Shan et al. 2005 mention single shots that deviate by about 5 standard deviations.
         outlier_sigma: f64 = key(above_to(0.0, 1000.0)).or(5.0),
         /// Largest share of outliers. The default is a choice of areograph.
         outlier_share_max: f64 = key(from_to(0.0, 1.0)).or(0.05),
-        /// Smallest number of shots in a profile that is judged: windows clip profiles, and shorter profiles are
-        /// excluded, with a remark. A site without a sufficiently long profile is invalid where ranges can be tested.
-        /// The default is one PEDR frame; the profiles of Shan et al. 2005 have 71 to 174 shots.
+        /// Smallest number of shots in a profile that is judged. Windows clip profiles; shorter profiles are excluded,
+        /// with a remark. A site without a sufficiently long profile is invalid where ranges can be tested. The default
+        /// is one PEDR frame; the profiles of Shan et al. 2005 have 71 to 174 shots.
         shots_min: u32 = key(whole_from_to(2, 1_000_000)).or(20),
         /// Largest |mean| of range minus distance to the spacecraft position in the PEDR file: a test of decoding,
-        /// independent of kernels. Footprint and spacecraft position are from one orbit solution, and range and
+        /// independent of kernels. Footprint and spacecraft position are from one orbit solution, so that range and
         /// distance agree to about a metre.
         decoding_max_m: f64 = key(above_to(0.0, 1e6)).or(2.0),
         /// Largest mean distance between the spacecraft positions in the file and from the kernels: a test of orbit,
@@ -38,7 +38,7 @@ declare_table! {
         /// Half width of the clock bias scan, which tries biases on both sides of 0. The default is about four times
         /// the MOLA bias of 0.117 s.
         scan_half_width_s: f64 = key(above_to(0.0, 10.0)).or(0.5),
-        /// Step of the clock bias scan: at most the half width, and at least a 10000th of the full width.
+        /// Step of the clock bias scan: at most the half width, and at least 1/10000 of the full width.
         scan_step_s: f64 = key(above_to(0.0, 10.0)).or(0.01),
     }
     check step_fits

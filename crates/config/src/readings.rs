@@ -115,7 +115,7 @@ impl Form for DecisionFile {
         let Some(path) = path.filter(|path| path.is_file()) else {
             found.refuse(
                 review,
-                "the path of a file that `areograph compare-readings --toml` printed",
+                "the path of a file with the output of `areograph compare-readings --toml`",
             );
             return None;
         };

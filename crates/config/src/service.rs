@@ -124,7 +124,7 @@ declare_table! {
             |text| text.parse::<chrono_tz::Tz>().is_ok(),
         )).or("UTC".to_owned()),
         /// Largest age of a missed night that the service makes up for after a restart; of several missed nights, only
-        /// the newest is made up for.
+        /// the last is made up for.
         catch_up_h: f64 = key(from_to(0.0, 8784.0)).or(36.0),
     }
 }
@@ -140,7 +140,7 @@ declare_table! {
         /// Largest share of files that may disappear from a folder; above this limit, the folder is treated as
         /// unavailable, and the sites that use it wait.
         max_loss: f64 = key(from_to(0.0, 1.0)).or(0.2),
-        /// Longest time for listing a folder; an unavailable mount does not respond.
+        /// Longest time for listing a folder; an unavailable mount may not respond.
         sweep_limit_s: f64 = key(from_to(0.1, 3600.0)).or(30.0),
         /// Interval at which all files are reread, even if the file system reports no change, days; 0 disables
         /// rereading.
@@ -157,13 +157,13 @@ declare_table! {
         count: u16 = key(whole_from_to(1, 256)).or(2),
         /// Number of threads of each process.
         threads: u16 = key(whole_from_to(1, 1024)).or(2),
-        /// Memory limit of each process, mebibytes. A worker uses about 106 before it reads a site.
+        /// Memory limit of each process, mebibytes. A worker uses about 106 MiB before it reads a site.
         memory_mib: u32 = key(whole_from_to(512, 1 << 24)).or(8192),
         /// Longest run time of a site.
         deadline_s: f64 = key(from_to(1.0, 2_592_000.0)).or(21_600.0),
         /// Time without a heartbeat after which a worker is terminated.
         silence_s: f64 = key(from_to(1.0, 86_400.0)).or(30.0),
-        /// Largest log of an attempt, kibibytes; the middle of a larger log is omitted.
+        /// Largest size of the log of an attempt, kibibytes; the middle of a larger log is omitted.
         log_max_kib: u32 = key(whole_from_to(16, 1 << 20)).or(4096),
         /// Free space on the disks of products and state below which no site is started, mebibytes.
         min_free_mib: u32 = key(whole_from_to(0, 1 << 24)).or(1024),
@@ -205,7 +205,7 @@ declare_table! {
 declare_table! {
     /// Largest movement of a site between two runs that causes no alert, as in `areograph report diff`.
     pub struct MovedConfig {
-        /// Largest movement of a footprint, a camera or a boresight on the ground.
+        /// Largest movement of a footprint, of a camera, or of the point at which a boresight meets the ground.
         limit_m: f64 = key(from_to(0.0, 1e7)).or(50.0),
         /// Largest rotation of a camera.
         limit_arcsec: f64 = key(from_to(0.0, 1_296_000.0)).or(60.0),
@@ -306,7 +306,7 @@ pub enum AlertKind {
     RootUnavailable,
     /// A folder of inputs is back.
     RootBack,
-    /// A file that sites read left its folder, or cannot be used.
+    /// A file that sites read is no longer in its folder, or cannot be used.
     InputLost,
     /// Archive files could not be fetched.
     FetchFailed,
@@ -352,7 +352,7 @@ impl AlertKind {
         (
             "input_lost",
             Self::InputLost,
-            "sites wait for a file that left its folder or cannot be used",
+            "sites wait for a file that is no longer in its folder or cannot be used",
         ),
         (
             "fetch_failed",

@@ -42,8 +42,8 @@ declare_table! {
         layout: Option<ShotLayout> = key(words([
             ("lola_rdr", ShotLayout::LolaRdr, "LOLA reduced data records from the Orbital Data Explorer, 29 columns"),
             ("areograph", ShotLayout::Areograph, "footprints.csv of another site (products.formats, or areograph export)"),
-            ("ode_pedr", ShotLayout::OdePedr, "MOLA shots from the PEDR query of the Orbital Data Explorer, ten columns, no \
-                spacecraft"),
+            ("ode_pedr", ShotLayout::OdePedr, "MOLA shots from the PEDR query of the Orbital Data Explorer, \
+                ten columns, without the position of the spacecraft"),
         ])).unused(r#""lola_rdr""#),
         /// Datum of longitudes and latitudes; the default is the datum of the products.
         datum: Option<Datum> = key(words([
@@ -88,7 +88,7 @@ declare_table! {
         spacecraft_radius_km: Option<String> = key(text()).unused(r#""21""#),
         /// Distance of the spacecraft from the centre of the body, metres.
         spacecraft_radius_m: Option<String> = key(text()).unused(r#""sc_rad""#),
-        /// Orbit number. Without this key it is 0, and only pauses separate profiles.
+        /// Orbit number. Without this key, all shots have the orbit number 0, and only pauses separate profiles.
         orbit: Option<String> = key(text()).unused(r#""orbit""#),
     }
 }

@@ -111,7 +111,7 @@ impl Document for SiteConfig {
     const HEADER: &'static str = "\
 # Site configuration of areograph: every key with its unit, range and default.
 #
-# Only `site`, one kernel source, and [pedr] (or [[shots]]) with [[windows]], or else [[images]], are required;
+# Only `site`, one kernel source, and shots ([pedr] or [[shots]], with [[windows]]), [[images]] or both are required;
 # an omitted key has the default given here. Relative paths are relative to the folder of this file.
 # Angles are in degrees, exposures in milliseconds, times in seconds; longitudes are east and latitudes
 # areocentric, in the frame of the body: IAU 2000 for Mars. Schema: ../schema/site.schema.json
@@ -256,7 +256,7 @@ fn something_to_do(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     match keys.span_of("images") {
         Some(images) if !site.images.is_empty() => keys.review().warn(
             images,
-            "images without a table [pedr]: orientation only, no footprints and no range check"
+            "images without a table [pedr] or tables [[shots]]: orientation only, no footprints and no range check"
                 .to_owned(),
         ),
         _ => keys.missing(
@@ -317,7 +317,7 @@ fn other_bodies(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
                 .refuse(kind.span(), "windows.latitude", expected);
         }
     }
-    let only_at_mars = format!("no such entry on {body}: it belongs to Mars Global Surveyor");
+    let only_at_mars = format!("no such entry for {body}: it applies only to Mars Global Surveyor");
     for table in ["pedr", "altimeter_clock", "pointing"] {
         keys.refuse(table, &only_at_mars);
     }
@@ -346,8 +346,8 @@ fn pointing_of_instruments(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
         let spacecraft = camera.spacecraft;
         if used_s.abs() > spacecraft.ck_bias_max_s {
             let expected = format!(
-                "no such key, because it applies to all images of the site: attitude kernels of {}, which carries {}, need no \
-                 time correction; state the bias of a different camera in a separate instrument file",
+                "no such key, because it applies to all images of the site, and the attitude kernels of {} (camera: {}) \
+                 need no time correction; state the bias of any other camera in an instrument file",
                 spacecraft.full_name, camera.name
             );
             keys.refuse_below("pointing", "ck_bias_s", expected);
@@ -378,7 +378,7 @@ fn kernels_of_spacecraft(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     let mut cameras = cameras(&site.images).into_iter();
     if let Some(camera) = cameras.find(|camera| !camera.spacecraft.has_laser()) {
         let expected = format!(
-            "kernels.files or kernels.metakernel: the program does not select kernels of {}, which carries {}",
+            "kernels.files or kernels.metakernel: the program does not select kernels of {} (camera: {})",
             camera.spacecraft.full_name, camera.name
         );
         keys.refuse_below("kernels", key, expected);

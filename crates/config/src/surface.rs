@@ -14,8 +14,8 @@ declare_table! {
     /// no terrain model is computed.
     pub struct SurfaceConfig: Deserialize {
         /// Edge of a cell of the terrain model, usually three pixels of the coarser image; each height refers to a
-        /// square of 17 pixels. Cells smaller than a pixel are refused. For cells larger than six pixels, images are
-        /// compared at a coarser resolution, which is fast.
+        /// square of 17 by 17 pixels. Cells smaller than a pixel are refused. For cells larger than six pixels, images
+        /// are compared at a coarser resolution, which is faster.
         cell_m: Option<f64> = key(above_to(0.0, 1e5)).unused("15.0"),
         /// Edge of a cell of orthoimages on this terrain model, usually the ground size of an image pixel. Orthoimages
         /// are computed from every image with `pixels` and tie points; without this key, none is computed.

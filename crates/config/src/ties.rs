@@ -19,12 +19,12 @@ use super::{
 declare_table! {
     /// Tie points between the images. Without this table, there is no intersection and no adjustment.
     pub struct TiesConfig: Deserialize {
-        /// Paths, folders or globs, as in `[pedr]`, of tables (.csv) or of ISIS control networks, binary or in PVL. Tables have
-        /// one row per measurement: `point_id`, `serial_number`, `sample`, `line` and, where known, the standard
-        /// deviations `line_sigma_px` and `sample_sigma_px`. Fixed or constrained points of control networks provide
-        /// coordinates in IAU 2000. Lines and samples are counted as in ISIS: the middle of the first pixel is 1.
-        /// `serial_number` is the `serial_number`, the `id` or the serial number in ISIS of an image; measurements in
-        /// other images are counted and excluded.
+        /// Paths, folders or globs, as in `[pedr]`, of tables (.csv) or of ISIS control networks, binary or in PVL.
+        /// Tables have one row per measurement: `point_id`, `serial_number`, `sample`, `line` and, where known, the
+        /// standard deviations `line_sigma_px` and `sample_sigma_px`. Fixed or constrained points of control networks
+        /// provide coordinates in IAU 2000. Lines and samples are counted as in ISIS: the middle of the first pixel is
+        /// 1. The column `serial_number` contains the `serial_number`, the `id` or the ISIS serial number of an image
+        /// of the site; measurements in other images are counted and excluded.
         #[serde(skip)]
         files: Vec<PathBuf> = key(Globs(TIE_ENDINGS))
             .or(Vec::new())
@@ -81,7 +81,8 @@ declare_table! {
             (
                 "line",
                 ErrorUnit::Line,
-                "lines along the track and pixels across it; this changes the distribution of a disagreement among images",
+                "lines along the track and pixels across it; this changes how a disagreement is distributed among the \
+                 images",
             ),
         ])).or(ErrorUnit::Focal),
         /// Standard deviation of measurements; if `weighting` is "line", only across the track.

@@ -69,14 +69,14 @@ declare_table! {
         /// South and north edges.
         latitude_deg: Option<[f64; 2]> =
             key(several(from_to(-90.0, 90.0), "two numbers [south, north]")).example("[-14.0, -12.9]"),
-        /// Direction in which these longitudes increase. With "west", the west edge is the larger number:
-        /// `[184.95, 184.45]` is 0.5 degrees wide.
+        /// Direction in which the longitudes in `longitude_deg` increase. With "west", the west edge is the larger
+        /// number: `[184.95, 184.45]` is 0.5 degrees wide.
         longitude: LongitudeSense = key(words([
             ("east", LongitudeSense::East, ""),
             ("west", LongitudeSense::West, "as on older maps of Mars"),
         ])).or(LongitudeSense::East),
-        /// Kind of these latitudes. Areographic ones are converted with the ellipsoid of IAU 2000; polygons and products
-        /// are always areocentric.
+        /// Kind of the latitudes in `latitude_deg`. Areographic latitudes are converted with the ellipsoid of IAU 2000;
+        /// polygons and products are always areocentric.
         latitude: LatitudeKind = key(words([
             ("areocentric", LatitudeKind::Areocentric, ""),
             ("areographic", LatitudeKind::Areographic, "only on Mars"),

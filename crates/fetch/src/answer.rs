@@ -68,7 +68,7 @@ impl Made {
                     excerpt(&note.unwrap_or(status))
                 )),
                 (_, _, files) => refused(format!(
-                    "its answer names no table with radii (*_pts_csv.csv), but {}",
+                    "its answer names {}; expected a table with radii (*_pts_csv.csv)",
                     excerpt(&files.join(", "))
                 )),
             });

@@ -52,7 +52,7 @@ pub enum FetchError {
         attempts: u32,
     },
     /// A redirection that is not followed.
-    #[error("{url} redirects to {to}, which is not followed: {why}")]
+    #[error("{url} redirects to {to}; the redirection is not followed: {why}")]
     #[cause(Io: "if the archive has moved, give its new address in a table (--archives)")]
     Redirect {
         /// Address.
@@ -105,7 +105,7 @@ pub enum FetchError {
     },
     /// A box without shots.
     #[error("{url}: the service has no shot in this box")]
-    #[cause(Coverage: "correct or enlarge the window: longitudes are east, latitudes areocentric")]
+    #[cause(Coverage: "correct or enlarge the window: longitudes are positive east, latitudes areocentric")]
     NoShots {
         /// The query.
         url: String,

@@ -270,7 +270,10 @@ impl Receiver<'_> {
         }
         match length {
             Some(length) if writer.bytes < length => {
-                let problem = format!("ended after {} of {length} bytes", writer.bytes);
+                let problem = format!(
+                    "the transfer ended after {} of {length} bytes",
+                    writer.bytes
+                );
                 Err(Fault::Passing(problem, None))
             }
             _ => Ok(()),

@@ -121,7 +121,7 @@ pub enum Unintersected {
         rays: usize,
     },
     /// The rays are too close to parallel, as the rays of an image with itself.
-    #[error("rays meet at {angle_deg:.3} degrees at most")]
+    #[error("rays intersect at an angle of at most {angle_deg:.3} degrees")]
     NearParallel {
         /// Largest angle between two rays, degrees.
         angle_deg: f64,
@@ -130,13 +130,13 @@ pub enum Unintersected {
     #[error("the rays do not determine the point")]
     IllConditioned,
     /// The rays meet behind a camera.
-    #[error("the rays meet behind a camera, at {depth_m:.0} m along its boresight")]
+    #[error("the rays intersect behind a camera, at {depth_m:.0} m along its boresight")]
     BehindCamera {
         /// Distance along the boresight, metres.
         depth_m: f64,
     },
     /// The rays meet far from the surface.
-    #[error("the rays meet {height_m:.0} m above the ellipsoid")]
+    #[error("the rays intersect {height_m:.0} m above the ellipsoid")]
     Height {
         /// Height above the ellipsoid, metres.
         height_m: f64,

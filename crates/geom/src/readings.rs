@@ -34,22 +34,23 @@ const FACTORS: [f64; 3] = [
     std::f64::consts::SQRT_2,
 ];
 
-/// Displacement of the ground along the track, first minus second image of a pair, and its dependence on errors of both.
+/// Displacement of the ground along the track, first minus second image of a pair, and its dependence on errors of both
+/// images.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 pub struct AlongTrack {
     /// Measured displacement, metres: the mean over the tie points.
     pub apart_m: f64,
-    /// Its standard deviation from the scatter of the tie points, metres.
+    /// Standard deviation of `apart_m`, from the scatter of the tie points, metres.
     #[cfg_attr(feature = "schema", schemars(range(min = 0.0)))]
     pub sigma_m: f64,
     /// Distance of the ground from each camera, metres: displacement per radian of a rotation about the axis across the track.
     #[cfg_attr(feature = "schema", schemars(transform = all_positive))]
     pub range_m: [f64; 2],
-    /// Displacement by a delay of the lines of each image, metres per second.
+    /// Displacement due to a delay of the lines of each image, metres per second.
     #[cfg_attr(feature = "schema", schemars(transform = all_positive))]
     pub line_time_m_s: [f64; 2],
-    /// Displacement by an offset of the attitude clock of both images, metres per second.
+    /// Displacement due to an offset of the attitude clock of both images, metres per second.
     pub clock_m_s: f64,
 }
 

@@ -117,7 +117,7 @@ pub enum GroundPart {
         /// Pixels.
         along_px: f64,
     },
-    /// Orientation explains more than the entire discrepancy.
+    /// The orientation explains more than the entire discrepancy.
     NotResolvable,
     /// No footprint is in both images.
     NotObserved,
@@ -129,11 +129,12 @@ pub enum GroundPart {
 pub struct SignedBudget {
     /// Along-track discrepancy due to orientation, root mean square of `Δx1 − Δx2`, pixels.
     pub along_px: f64,
-    /// Mean misregistration of the footprints that the mean discrepancy does not explain, pixels; missing where no
-    /// footprint is in both images. A planimetric footprint error moves both projections alike and is not visible.
+    /// Part of the mean misregistration of the footprints that the mean discrepancy does not explain, pixels; missing
+    /// where no footprint is in both images. A planimetric footprint error moves both projections alike and is not
+    /// visible.
     #[serde(default, skip_serializing_if = "areograph_base::stored::is_left_out")]
     pub unexplained_px: Option<f64>,
-    /// Point uncertainty, eq. 8 and 9, from these discrepancies.
+    /// Point uncertainty, eq. 8 and 9, from the discrepancies with signs.
     pub point: PointUncertainty,
 }
 
@@ -147,7 +148,7 @@ pub struct UncertaintyBudget {
     /// in both images.
     #[serde(default, skip_serializing_if = "areograph_base::stored::is_left_out")]
     pub total_along_px: Option<f64>,
-    /// Contribution of the footprints to this misregistration, eq. 6.
+    /// Contribution of the footprints to the misregistration, eq. 6.
     pub ground: GroundPart,
     /// Point uncertainty, eq. 8 and 9, with the average of the across-track residuals of both images, as in Shan et al. 2005.
     pub paper_average: PointUncertainty,
@@ -228,7 +229,7 @@ pub enum BudgetError {
     #[cause("intersect tie points of at least one stereo pair first")]
     NoSites,
     /// A number outside its range.
-    #[error("{what} is {value}, expected {expected}")]
+    #[error("{what} is {value}; expected {expected}")]
     #[cause("check the geometry and the residuals of the stereo pairs")]
     Value {
         /// The number.

@@ -74,7 +74,7 @@ pub enum LabelError {
     NoLabel,
     /// An invalid value.
     #[error("{key} is {value:?}; expected {expected}")]
-    #[cause("correct the label, or write the key in the image's table of the configuration")]
+    #[cause("correct the label, or add the key to the image's table in the configuration")]
     Value {
         /// The keyword.
         key: String,
@@ -84,7 +84,7 @@ pub enum LabelError {
         expected: &'static str,
     },
     /// No statement marks the end of the label.
-    #[error("the label has no END; expected that statement after its last line")]
+    #[error("the label has no END; expected this statement after the last line")]
     #[cause("fetch the file again: its label is truncated or damaged")]
     NoEnd,
     /// Two values under one keyword.

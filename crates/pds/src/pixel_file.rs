@@ -85,8 +85,8 @@ pub enum PixelFileError {
     /// A picture that its library rejects, or of a different kind.
     #[error("{format}: {reason}")]
     #[cause(
-        "give a complete greyscale picture of one band with 8, 16 or 32 bits per pixel; a TIFF is uncompressed, or has LZW \
-         or deflate compression"
+        "give a complete greyscale picture of one band with 8, 16 or 32 bits per pixel; a TIFF must be uncompressed, \
+         or use LZW or deflate compression"
     )]
     Picture {
         /// Its format.

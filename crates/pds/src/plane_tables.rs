@@ -81,8 +81,8 @@ pub struct TickRow {
 /// # Errors
 /// The file cannot be read; missing columns; a table without a readable row.
 pub fn read_measurements(path: &Path) -> Result<Rows<MeasurementRow>> {
-    const COLUMNS: &str =
-        "picture, point, x, y or x_upper_right, y_upper_right, x_lower_left, y_lower_left";
+    const COLUMNS: &str = "picture and point, with x and y, or with x_upper_right, y_upper_right, x_lower_left and \
+        y_lower_left";
     read_rows(path, EXAMPLE, |header| {
         let [picture, point] = columns(header, ["picture", "point"], COLUMNS)?;
         let boxed = columns(
@@ -122,7 +122,8 @@ pub fn read_measurements(path: &Path) -> Result<Rows<MeasurementRow>> {
 /// # Errors
 /// As [`read_measurements`]; coordinates in an unknown unit.
 pub fn read_controls(path: &Path) -> Result<Rows<ControlRow>> {
-    const COLUMNS: &str = "point and x_m, y_m or x_km, y_km or longitude_deg, latitude_deg";
+    const COLUMNS: &str =
+        "point, with x_m and y_m, x_km and y_km, or longitude_deg and latitude_deg";
     read_rows(path, EXAMPLE, |header| {
         let [point] = columns(header, ["point"], COLUMNS)?;
         let pair = |names: [&'static str; 2]| columns(header, names, COLUMNS);

@@ -141,7 +141,7 @@ pub struct RowComplaint {
 #[derive(Debug, thiserror::Error, Cause)]
 #[cause(Input)]
 enum ShotTableError {
-    #[error("no column is called \"{name}\" (shots.columns.{key}); the first row has {}", found.join(", "))]
+    #[error("unknown column \"{name}\" (shots.columns.{key}); the first row contains {}", found.join(", "))]
     #[cause("give the column name as in the table, or the column number, counted from 1")]
     Column {
         key: &'static str,

@@ -49,7 +49,7 @@ enum TieError {
     #[error("binary control network of version {0}; expected version 2 or 5")]
     #[cause("convert it with ISIS: cnetbin2pvl from=control.net to=control.pvl")]
     BinaryVersion(u64),
-    #[error("{key} of the label of a binary control network is {value}; expected a number")]
+    #[error("{key} in the label of the binary control network is {value}; expected a number")]
     #[cause("transfer the file again in binary mode, or rewrite it with ISIS")]
     BinaryLabel { key: &'static str, value: String },
     #[error(
@@ -65,7 +65,7 @@ enum TieError {
     #[cause(like = BinaryLabel)]
     BinaryHeader(String),
     #[error(
-        "the sizes of the points of the binary control network do not add up to PointsBytes of its label"
+        "the sizes of the points in the binary control network do not add up to PointsBytes in its label"
     )]
     #[cause(like = BinaryLabel)]
     BinarySizes,

@@ -68,13 +68,13 @@ fn shot_columns<'a>() -> Vec<Column<Shot<'a>>> {
         columns.push(column(
             initial,
             Unit::Metre,
-            "coordinate of the footprint before the adjustment, {frame}, metres",
+            "X, Y or Z of the footprint before the adjustment, {frame}, metres",
             move |shot: &Shot| shot.0.initial.xyz_m[axis],
         ));
         columns.push(column(
             adjusted,
             Unit::Metre,
-            "coordinate of the adjusted footprint, {frame}, metres",
+            "X, Y or Z of the adjusted footprint, {frame}, metres",
             move |shot: &Shot| shot.0.ground.xyz_m[axis],
         ));
         columns.push(column(
@@ -120,7 +120,7 @@ fn local_columns<'a>() -> Vec<Column<Shot<'a>>> {
     let kinds: [([&'static str; 3], &'static str, Sigmas); 3] = [
         (
             ["sigma_east_m", "sigma_north_m", "sigma_up_m"],
-            "standard deviation in east, north or height, including the shift of the profile, metres",
+            "standard deviation in east, north or height, including the uncertainty of the profile's shift, metres",
             |point| Some(point.local_sigmas_m()),
         ),
         (
@@ -138,7 +138,8 @@ fn local_columns<'a>() -> Vec<Column<Shot<'a>>> {
                 "relative_sigma_north_m",
                 "relative_sigma_up_m",
             ],
-            "standard deviation without the shift of the profile, for differences between footprints of one profile, metres",
+            "standard deviation without the uncertainty of the profile's shift, for differences between footprints of \
+             one profile, metres",
             CorrectedPoint::relative_sigmas_m,
         ),
     ];

@@ -172,7 +172,7 @@ pub(super) static CENTRE_POSITION: Declaration = kernel(
 
 pub(super) static METAKERNEL: Declaration = Declaration {
     path: "adjusted.tm",
-    what: "metakernel of the site kernels, followed by the adjusted kernels",
+    what: "metakernel with the site kernels, followed by the adjusted kernels",
     readers: RUN,
     rows: "",
     role: Role::Metadata,
@@ -314,12 +314,12 @@ fn comment(image: &AdjustedImage, readers: KernelReaders, to: &AdjustedKernels) 
     } else {
         format!(
             "ISIS and ALE always read the attitude at an offset of {usual_s:.3} s: load the files in\n\
-             exchange/centre there."
+             exchange/centre in these programs."
         )
     };
     format!(
         "Adjusted orientation of image {id}; written by areograph {version}.\n\
-         Load this file after the mission kernels. It is valid only for this image, which was exposed over\n\
+         Load this file after the mission kernels. It is valid only for this image, which was exposed during\n\
          {exposed}\n\
          (UTC of the first line {utc}). Where the adjustment found that lines were exposed later or earlier\n\
          than their tags, the orientation of a line is stored at its tag: do not use this file\n\
@@ -328,8 +328,9 @@ fn comment(image: &AdjustedImage, readers: KernelReaders, to: &AdjustedKernels) 
          Positions: {spacecraft} relative to the centre of Mars, geometric, J2000, with the Mars rotation of the\n\
          IAU 2000 report (pck00008 to pck00010). {positions}\n\
          Use positions and attitudes together: the adjustment does not separate them from line times along the track.\n\
-         The camera may have been farther along its orbit when a line was exposed; the attitude compensates for this\n\
-         on the ground (adjustment.json, line_time_sigma_s).\n\
+         The camera may have been elsewhere along its orbit when a line was exposed; the attitude compensates for \
+         this\n\
+         on the ground (line_time_sigma_s in adjustment.json).\n\
          \n\
          Attitudes: J2000 to {bus_frame}. The attitude of an exposure at t is stored at t {sign} {size:.3} s,\n\
          as in the kernels that this file replaces. {others}\n",
@@ -349,20 +350,21 @@ fn comment(image: &AdjustedImage, readers: KernelReaders, to: &AdjustedKernels) 
 const fn positions(light_time: LightTime) -> &'static str {
     match light_time {
         LightTime::Surface => {
-            "This file is for readers that apply light time to the\n\
-             surface and aberration: an exposure has the position of the instant at which the light left the\n\
+            "This file is for readers that apply aberration and light\n\
+             time to the surface: an exposure has the position of the instant at which the light left the\n\
              ground. Programs that compute the spacecraft position from the centre of Mars (LT+S: ISIS, ALE) obtain\n\
-             a different position: load the files in exchange/centre there."
+             a different position: load the files in exchange/centre in these programs."
         }
         LightTime::None | LightTime::Support => {
             "This file is for readers that apply no light time:\n\
              an exposure has the position of its own instant. Programs that compute the spacecraft position from\n\
-             the centre of Mars (LT+S: ISIS, ALE) obtain a different position: load the files in exchange/centre there."
+             the centre of Mars (LT+S: ISIS, ALE) obtain a different position: load the files in exchange/centre in\n\
+             these programs."
         }
         LightTime::Centre => {
             "This file is for programs that compute the position as\n\
-             seen from the centre of Mars with light time and aberration (LT+S: ISIS, ALE): only they obtain the\n\
-             adjusted positions."
+             seen from the centre of Mars with light time and aberration (LT+S: ISIS, ALE): only these programs\n\
+             obtain the adjusted positions."
         }
     }
 }

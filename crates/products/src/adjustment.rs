@@ -221,12 +221,13 @@ struct ImageDocument<'a> {
     #[schemars(extend("exclusiveMinimum" = 0))]
     line_period_s: f64,
     correction: &'a [f64; ORIENTATION_UNKNOWNS],
-    /// Offset of the spacecraft in the PEDR file from the kernels, X, Y and Z, metres, if this is the a priori value.
+    /// Position of the spacecraft in the PEDR file minus its position in the kernels, X, Y and Z, metres, if the former
+    /// is the a priori position.
     #[serde(skip_serializing_if = "Option::is_none")]
     pedr_orbit_m: Option<[f64; 3]>,
     #[schemars(transform = none_negative)]
     sigmas: &'a [f64; ORIENTATION_UNKNOWNS],
-    /// Standard deviation of the delay of all lines, as contained in `sigmas`; 0 if `sigmas` contain no delay.
+    /// Standard deviation of the delay of all lines, as contained in `sigmas`; 0 if `sigmas` do not contain it.
     #[schemars(range(min = 0.0))]
     line_time_sigma_s: f64,
     /// Time bias of the image, seconds, with its standard deviation.
@@ -240,7 +241,8 @@ pub const ADJUSTMENT: &str = "adjustment.json";
 
 pub(super) static DOCUMENT: Declaration = Declaration {
     path: ADJUSTMENT,
-    what: "tie points intersected before and after the adjustment, comparisons of image pairs, and the adjustment",
+    what: "tie points intersected with the orientations before and after the adjustment, comparisons of image pairs, \
+           and the adjustment",
     readers: "scripts",
     rows: "adjusted points",
     role: Role::Data,

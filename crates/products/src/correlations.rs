@@ -10,7 +10,8 @@ use areograph_stages::adjust::CorrectedImage;
 
 pub(super) static TABLE: Declaration = Declaration {
     path: "correlations.parquet",
-    what: "correlations between the orientation coefficients of each image, from covariances that contain line times",
+    what: "correlations between the orientation coefficients of each image, from covariances that include the delay \
+           of lines",
     readers: "scripts",
     rows: "pairs of unknowns",
     role: Role::Data,

@@ -43,7 +43,8 @@ fn contents(of_sites: &[&'static Declaration]) -> impl Iterator<Item = Content> 
 #[must_use]
 pub fn documentation(of_sites: &[&'static Declaration]) -> String {
     let mut text = "# Products\n\n\
-        Generated from the declarations in `crates/products/src`; `tests/products/generated.rs` reports when it is stale.\n\n\
+        This page is generated from the declarations in `crates/products/src`; `tests/products/generated.rs` reports \
+        an outdated page.\n\n\
         Paths are relative to the site's folder; `<image>` stands for the identifier of an image. `manifest.json`, \
         which is written last, records the inputs of all products.\n\n\
         | file | what it is | for | one for | rows | schema |\n|---|---|---|---|---|---|\n"
@@ -60,8 +61,7 @@ pub fn documentation(of_sites: &[&'static Declaration]) -> String {
             schema_link(product),
         );
     }
-    text +=
-        "\n## Columns\n\nNames end in the unit. `?` marks columns without a value in some rows.\n";
+    text += "\n## Columns\n\nNames end in the unit. `?` marks columns that lack a value in some rows.\n";
     for product in of_sites {
         text += &columns_of(product, "");
     }
@@ -82,7 +82,7 @@ fn group_of(group: &Group) -> String {
     } = group;
     let mut text = format!(
         "\n## {heading}\n\nProducts of {source}; `manifest.json` is written last here as well. `{prefix}:` precedes \
-        their names below{placeholders}.\n\n\
+        the names of these products below{placeholders}.\n\n\
         | file | what it is | for | rows | schema |\n|---|---|---|---|---|\n"
     );
     text.extend(products.iter().map(line_of));

@@ -165,7 +165,7 @@ fn columns() -> Vec<Column<Compared>> {
         column(
             "kind",
             Unit::None,
-            "tie for a tie point, footprint for a footprint that both images of a pair show according to the tie points",
+            "tie (a tie point) or footprint (a footprint that both images of a pair show according to the tie points)",
             |row: &Compared| row.kind.to_owned(),
         ),
         column(
@@ -183,49 +183,55 @@ fn columns() -> Vec<Column<Compared>> {
         column(
             "longitude_deg",
             Unit::Degree,
-            "east longitude of the adjusted point, or else of the intersected point, degrees",
+            "east longitude of the point after the adjustment or, without an adjustment, of the intersected point, \
+             degrees",
             |row: &Compared| Some(degrees(row.place()?.longitude_rad)),
         ),
         column(
             "latitude_deg",
             Unit::Degree,
-            "{latitude} latitude of the adjusted point, or else of the intersected point, degrees",
+            "{latitude} latitude of the point after the adjustment or, without an adjustment, of the intersected \
+             point, degrees",
             |row: &Compared| Some(degrees(row.place()?.latitude.0)),
         ),
         column(
             "nearest_shot_m",
             Unit::Metre,
-            "horizontal distance to the nearest shot, metres",
+            "horizontal distance to the nearest shot, metres; 0 for footprints",
             |row: &Compared| Some(row.latest()?.nearest_shot_m),
         ),
         column(
             "surface_sigma_m",
             Unit::Metre,
-            "standard deviation of the {altimeter} surface at this point, metres; missing for footprints",
+            "standard deviation of the {altimeter} surface at the tie point, metres; missing for footprints",
             |row: &Compared| row.latest()?.surface_sigma_m,
         ),
         column(
             "height_m",
             Unit::Metre,
-            "height of the intersected point above the ellipsoid of {frame} along the radius, metres",
+            "height of the point that is intersected with the orientation from the kernels, above the ellipsoid of \
+             {frame} along the radius, metres",
             |row: &Compared| Some(row.before?.height_m),
         ),
         column(
             "above_surface_m",
             Unit::Metre,
-            "height of the intersected point above the {altimeter} surface, or above the footprint, metres",
+            "height of the point that is intersected with the orientation from the kernels, above the {altimeter} \
+             surface (tie point) or above the footprint, metres",
             |row: &Compared| Some(row.before?.above_m),
         ),
         column(
             "adjusted_height_m",
             Unit::Metre,
-            "height of the adjusted point above the ellipsoid, metres",
+            "height of the adjusted tie point, or of the footprint intersected with the adjusted orientation, above \
+             the ellipsoid of {frame} along the radius, metres",
             |row: &Compared| Some(row.after?.height_m),
         ),
         column(
             "adjusted_above_surface_m",
             Unit::Metre,
-            "height of the adjusted point above the {altimeter} surface, or above the footprint, metres",
+            "height of the adjusted tie point above the {altimeter} surface, or of the footprint intersected with the \
+             adjusted orientation above the footprint of the laser, metres",
             |row: &Compared| Some(row.after?.above_m),
         ),
     ]

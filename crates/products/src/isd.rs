@@ -73,7 +73,8 @@ pub(super) static ISD: Declaration = Declaration {
 
 pub(super) static CENTRE: Declaration = Declaration {
     path: "exchange/centre/<image>_isd.json",
-    what: "camera model before an adjustment as ISIS and ALE derive it from the kernels: light time to the centre of {body}",
+    what: "camera model before the adjustment, as ISIS and ALE derive it from the kernels: light time to the centre \
+           of {body}",
     readers: "ISIS, ALE, Ames Stereo Pipeline",
     rows: "table nodes",
     role: Role::Data,
@@ -409,12 +410,13 @@ fn provenance<'a>(site: &SiteProducts<'a>, view: &View<'a>) -> Provenance<'a> {
             ),
             distortion,
             format!(
-                "instrument_position: {}{}; reading programs must not add any{}",
+                "instrument_position: {}{}; reading programs must not add light time or aberration{}",
                 view.light_time.convention.positions(),
                 view.convention,
                 match view.round {
                     Round::Initial | Round::Matching => "",
-                    Round::Adjusted => "; with the correction and the shift of line times in ../../adjustment.json",
+                    Round::Adjusted => "; the correction and the shift of line times in ../../adjustment.json are \
+                                        included",
                 },
             ),
             format!(
@@ -428,7 +430,7 @@ fn provenance<'a>(site: &SiteProducts<'a>, view: &View<'a>) -> Provenance<'a> {
                     }
                 },
             ),
-            "image_lines: delivered lines; lines_header were exposed".to_owned(),
+            "image_lines: number of delivered lines; lines_header lines were exposed".to_owned(),
         ],
         site: &site.config.site,
         start_from: times.start_from,

@@ -30,7 +30,7 @@ pub(super) fn convention(site: &SiteProducts) -> String {
     };
     let choice = site.footprints.ground_choice();
     let radii = choice.map_or_else(String::new, |of| {
-        format!(", radii of the ground are those {}", of.words())
+        format!("; radii of the ground are those {}", of.words())
     });
     format!("{positions}; ranges of shots are geometric{radii}")
 }

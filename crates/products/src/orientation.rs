@@ -31,14 +31,15 @@ use areograph_stages::{
 
 const CONVENTIONS: [&str; 6] = [
     "frame: {body_name} body-fixed, {frame}, metres; straight rays to the ground start at the positions, see light_time",
-    "abscissa x: lines from the middle of the header image, positive along the flight; x = (t - t_middle) / line period",
+    "abscissa x: lines from the middle of the header image, positive along the flight; x = (t - t_middle) / (line \
+     period)",
     "polynomial: value = c0 + c1 x + c2 x^2, coefficients from the constant upwards; residual = sample - polynomial; \
      RMSE divides by the number of samples (Shan et al. 2005, Table 4)",
     "angles: camera to {body} = [kappa]3 [phi]2 [omega]1, rotations of the frame; the matrix M from {body} to camera has \
      m13 = sin phi, m23 = -sin omega cos phi, m12 = -cos phi sin kappa; radians, continuous over the image",
     "quaternions: (w, x, y, z) in SPICE's convention, camera to {body}, continuous over the image",
-    "rotation vector: M(x) = exp([r(x)]x) M_reference, M from {body} to camera components; positions as in the second \
-     order; to be used near gimbal lock, where |cos phi| < 0.1 leaves omega and kappa poorly determined",
+    "rotation vector: M(x) = exp([r(x)]x) M_reference, M from {body} to camera components; positions as in the \
+     second-order model; to be used near gimbal lock, where |cos phi| < 0.1 leaves omega and kappa poorly determined",
 ];
 
 #[derive(Serialize, JsonSchema)]
@@ -55,8 +56,8 @@ struct Document<'a> {
     invalid_because: Vec<&'a str>,
     times: Times<'a>,
     conventions: [Cow<'static, str>; 6],
-    /// Image offsets of the other conventions, with the orientation from the kernels: later lines and larger samples of the
-    /// boresight's ground point in the middle of the image.
+    /// Image offsets of the other conventions, with the orientation from the kernels: shifts of the boresight's ground
+    /// point in the middle of the image, positive towards later lines and larger samples.
     light_time: &'a LightTimeEffect,
     #[schemars(range(min = 3))]
     samples: usize,
@@ -175,7 +176,7 @@ pub(super) static TABLE: Declaration = declared!(
 
 pub(super) static DOCUMENT: Declaration = declared!(
     "images/<image>/orientation.json",
-    "times and sensor models: polynomials of first and second order with residuals, rotation-vector form",
+    "times and sensor models: polynomials of first and second order with residuals, and rotation-vector form",
     Content::Document(schema),
     Write::Image(write_document)
 );
@@ -237,7 +238,7 @@ fn columns<'a>() -> Vec<Column<Sample<'a>>> {
         column(
             "line_offset",
             Unit::Line,
-            "lines from the middle of the header image",
+            "line offset from the middle of the header image",
             |s: &Sample| s.0.line_offset,
         ),
         column(
@@ -306,13 +307,14 @@ fn columns<'a>() -> Vec<Column<Sample<'a>>> {
         boresight(
             "boresight_range_m",
             Unit::Metre,
-            "distance from the camera to this point, metres",
+            "distance from the camera to the point where the boresight meets the ellipsoid, metres",
             |ground| ground.range_m,
         ),
         boresight(
             "boresight_emission_deg",
             Unit::Degree,
-            "angle between the surface normal and the direction to the camera at this point, degrees",
+            "angle between the surface normal and the direction to the camera where the boresight meets the \
+             ellipsoid, degrees",
             |ground| degrees(ground.emission_rad),
         ),
     ]

@@ -37,7 +37,7 @@ pub(super) static OVERLAYS: Declaration = Declaration {
 
 pub(super) static METAKERNEL: Declaration = Declaration {
     path: "kernels.tm",
-    what: "metakernel of the site kernels in load order",
+    what: "metakernel with the site kernels in load order",
     readers: "SPICE",
     rows: "",
     role: Role::Metadata,

@@ -86,7 +86,8 @@ impl Cause for PictureError {
 /// A picture too large for its format.
 #[derive(Debug, thiserror::Error, Cause)]
 #[error("{width} × {height} pixels make a TIFF of {bytes} bytes; expected at most 4294967295")]
-#[cause(Input: "write a PNG; if the image is not so large, `areograph image info` lists its errors")]
+#[cause(Input: "write a PNG; if the image is smaller than stated, `areograph image info` lists the errors of its \
+                label")]
 struct TooLarge {
     width: u32,
     height: u32,

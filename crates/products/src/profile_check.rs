@@ -14,8 +14,8 @@ use areograph_stages::check_profiles::{LeftOutProfile, ShiftedProfile, WithheldS
 
 pub(super) static DOCUMENT: Declaration = Declaration {
     path: "profiles.json",
-    what: "crossovers of the profiles, profile shifts, profiles that contradict the others, and predictions of every profile \
-           from the others by the surface between shots",
+    what: "crossovers of the profiles, profile shifts, profiles that contradict the others, and predictions of each \
+           profile by the surface between the shots of the other profiles",
     readers: "scripts",
     rows: "crossovers",
     role: Role::Data,
@@ -31,8 +31,8 @@ pub(super) static DOCUMENT: Declaration = Declaration {
 const DEFINITIONS: [(&str, &str); 5] = [
     (
         "crossovers",
-        "places where two profiles measured the same ground, each interpolated between two shots; sigma_m: noise of four shots and \
-         the ground between them",
+        "places where two profiles measured the same ground, each interpolated between two shots; sigma_m: standard \
+         deviation due to the noise of the four shots and to the ground between them",
     ),
     (
         "differences_m",
@@ -45,8 +45,9 @@ const DEFINITIONS: [(&str, &str); 5] = [
     ),
     (
         "left_out",
-        "profiles that lie above or below three or more others by a constant of more than five standard deviations, or that are \
-         misplaced: the misfit of their heights at crossovers is too large; the surface between shots does not use them",
+        "profiles that lie above or below three or more others by a constant of more than five standard deviations, \
+         and misplaced profiles, whose misfit at crossovers is too large; the surface between shots does not use \
+         these profiles",
     ),
     (
         "withheld",
@@ -70,7 +71,8 @@ struct Document<'a> {
     /// Ground radius that all stages use; omitted if the shots have one radius.
     #[serde(skip_serializing_if = "Option::is_none")]
     ground_radius: Option<GroundRadius>,
-    /// Standard deviation of the radial error that the shots of a profile share, from crossovers and a priori.
+    /// Standard deviation of the radial error that the shots of a profile share, from crossovers and the a priori
+    /// value.
     #[schemars(range(min = 0.0))]
     profile_sigma_m: f64,
     differences_m: Summary,

@@ -30,33 +30,34 @@ use areograph_stages::{
 const DEFINITIONS: [(&str, &str); 7] = [
     (
         "range_minus_distance",
-        "measured range minus |spacecraft in the kernels - footprint with the raw radius|, both in {frame}, as in Table 3 of \
-         Shan et al. 2005; the sign is a convention of areograph",
+        "measured range minus distance from the spacecraft (kernels) to the footprint (raw radius), both in {frame}, \
+         as in Table 3 of Shan et al. 2005; the sign is a convention of areograph",
     ),
     (
         "range_minus_distance_crossover",
-        "measured range minus |spacecraft in the kernels - footprint with the crossover-corrected radius|",
+        "measured range minus distance from the spacecraft (kernels) to the footprint (crossover-corrected radius)",
     ),
     (
         "decoding",
-        "measured range minus |spacecraft in the {shot_file} - footprint with the raw radius|: a test, without kernels, that \
-        the file is read correctly",
+        "measured range minus distance from the spacecraft ({shot_file}) to the footprint (raw radius): a test, \
+         without kernels, that the file is read correctly",
     ),
     (
         "spacecraft_radial, _along, _cross",
-        "spacecraft in the {shot_file} minus spacecraft in the kernels: away \
-        from {body}, along the flight, along the orbital angular momentum",
+        "difference of spacecraft positions, {shot_file} minus kernels: away from {body} (radial), along the flight \
+         (along), and along the orbital angular momentum (cross)",
     ),
     (
         "trend",
-        "slope of range_minus_distance over time, with its standard uncertainty from the scatter about \
-        the line, including the correlation of neighbours",
+        "slope of range_minus_distance over time, with its standard uncertainty from the scatter about the line; this \
+         uncertainty includes the correlation between neighbouring shots",
     ),
     (
         "bias_scan",
         "spread of range_minus_distance as a function of an assumed correction of the time tags. Scatter and orbit limit \
-        best_s: uncertainty_s uses the mean difference of the two orbits as the error of either (one metre along the flight is \
-        0.3 ms), and contains the slope of this difference and of the radius correction along the profile",
+        the accuracy of best_s: uncertainty_s uses the mean difference of the two orbits as the error of either (one \
+        metre along the flight is 0.3 ms), and contains the slope of this difference and of the radius correction \
+        along the profile",
     ),
     (
         "summary",
@@ -144,15 +145,15 @@ struct ProfileDocument<'a> {
     judged: bool,
     valid: bool,
     invalid_because: &'a [String],
-    /// Shots of tables without a position of the spacecraft: the position is set on the radius through the footprint at the
-    /// range, so that the test does not apply.
+    /// Number of shots of tables without a position of the spacecraft: the position is assumed on the radius through
+    /// the footprint, at the measured range from it, so that the test does not apply.
     shots_nadir_by_range: u32,
     range_minus_distance_m: Summary,
     /// Mean without outliers, for comparison with the limit.
     mean_without_outliers_m: f64,
     range_minus_distance_crossover_m: Summary,
     decoding_m: Summary,
-    /// Mean of the decoding residuals without the same shots, for comparison with the limit.
+    /// Mean of the decoding residuals without the outliers of the range residuals, for comparison with the limit.
     decoding_without_outliers_m: f64,
     spacecraft_radial_m: Summary,
     spacecraft_along_m: Summary,
@@ -167,7 +168,8 @@ struct ProfileDocument<'a> {
 /// A scan without unknown members.
 #[derive(Serialize, JsonSchema)]
 struct Scan<'a> {
-    /// Footprint radius with the smaller spread of ranges.
+    /// Footprint radius of the scan: crossover-corrected if this radius reduces the least spread by more than 2 %,
+    /// otherwise raw.
     radius: ScannedRadius,
     correction_s: &'a [f64],
     spread_m: &'a [f64],
@@ -256,7 +258,7 @@ fn columns<'a>() -> Vec<Column<RangedShot<'a>>> {
         column(
             "profile",
             Unit::None,
-            "profile: window, orbit and crossing",
+            "identifier of the profile: window, orbit and crossing",
             RangedShot::profile,
         ),
         column(

@@ -275,7 +275,8 @@ fn shot<'a>() -> Vec<Column<Row<'a>>> {
         column(
             "profile",
             Unit::None,
-            "profile: window, orbit and crossing; of a footprint in several windows, the profile in the first window",
+            "identifier of the profile: window, orbit and crossing; for a footprint in several windows, the profile \
+             in the first window",
             |row: &Row| {
                 let profile = row.site.profiles.get(row.profile);
                 profile.map_or_else(String::new, |profile| profile.id.clone())
@@ -303,7 +304,7 @@ fn shot<'a>() -> Vec<Column<Row<'a>>> {
             "row of the footprint in footprints.parquet, counted from 0",
             |row: &Row| u32::try_from(row.footprint).unwrap_or(u32::MAX),
         ),
-        column("utc", Unit::None, "time et_s in UTC", |row: &Row| {
+        column("utc", Unit::None, "et_s as UTC, ISO 8601", |row: &Row| {
             row.site.utc.at(row.footprint)
         }),
         column(
@@ -345,7 +346,7 @@ fn ground<'a>() -> Vec<Column<Row<'a>>> {
         column(
             "topography_m",
             Unit::Metre,
-            "crossover-corrected radius minus the radius of the {areoid}, metres",
+            "planetary radius after the crossover correction minus the radius of the {areoid}, metres",
             |row: &Row| row.site.footprints.topography_of_m(row.footprint),
         ),
     ]
@@ -354,7 +355,7 @@ fn ground<'a>() -> Vec<Column<Row<'a>>> {
 /// Place in the image.
 fn image<'a>() -> Vec<Column<Row<'a>>> {
     type Of = fn(Place) -> Option<f64>;
-    let ours = "coordinate in the image, 0 at the leading edge of the first line or pixel, 0.5 at its centre";
+    let ours = "line or sample in the image, 0 at the outer edge of the first line or sample, 0.5 at its centre";
     let of: [([&'static str; 2], Unit, Of, &'static str); 4] = [
         (
             ["before_line", "adjusted_line"],
@@ -406,7 +407,7 @@ fn image<'a>() -> Vec<Column<Row<'a>>> {
     columns.push(column(
         "extrapolated",
         Unit::None,
-        "whether a position before or after the adjustment lies beyond the first or last header line, \
+        "whether the line coordinate before or after the adjustment lies beyond the first or last header line, \
          where the orientation is extrapolated",
         |row: &Row| row.places.iter().flatten().any(|place| place.extrapolated),
     ));
@@ -423,8 +424,8 @@ fn image<'a>() -> Vec<Column<Row<'a>>> {
 fn adjusted<'a>() -> Vec<Column<Row<'a>>> {
     let names = ["sigma_east_m", "sigma_north_m", "sigma_up_m"];
     let columns = names.into_iter().enumerate().map(|(axis, name)| {
-        let meaning = "standard deviation in east, north or height after the adjustment, including the shift of the profile, \
-                       metres; missing for footprints that are not part of the adjustment";
+        let meaning = "standard deviation in east, north or height after the adjustment, including the uncertainty of \
+                       the profile's shift, metres; missing for footprints that are not part of the adjustment";
         column(name, Unit::Metre, meaning, move |row: &Row| {
             Some(row.adjusted?.local_sigmas_m()[axis])
         })

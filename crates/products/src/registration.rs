@@ -27,8 +27,8 @@ use areograph_stages::{
 const DEFINITIONS: [(&str, &str); 7] = [
     (
         "line, sample",
-        "0 at the start of the first line and the outer edge of the first pixel, 0.5 at their centres; \
-        lines of the header image, by the light-time convention of the run",
+        "image coordinate of the footprint: 0 at the outer edge of the first line or sample of the header image, 0.5 \
+         at its centre; by the light-time convention of the run",
     ),
     (
         "points",
@@ -36,8 +36,8 @@ const DEFINITIONS: [(&str, &str); 7] = [
     ),
     (
         "light_time",
-        "light-time convention of the camera positions to which lines and samples belong; for each other convention, the \
-        offset of the ground in the middle of the image, positive towards later lines and larger samples",
+        "light-time convention of the camera positions to which lines and samples refer; for each other convention, \
+         the offset of the ground in the middle of the image, positive towards later lines and larger samples",
     ),
     (
         "methods",
@@ -46,26 +46,28 @@ const DEFINITIONS: [(&str, &str); 7] = [
     ),
     (
         "evaluations",
-        "evaluations of a method's formula until a step fell below the tolerance; of Newton's method: \
-        evaluations of the orientation",
+        "number of evaluations of a method's formula until a step fell below the tolerance; for Newton's method, \
+         number of evaluations of the orientation",
     ),
     (
         "mean_step_lines",
-        "mean |step| of each iteration over the points with a result, where a converged point counts as 0: \
-        Figure 4 of Shan et al. 2005",
+        "mean |step| of each iteration over the points with a result, where the step of a converged point counts as \
+         0, as in Figure 4 of Shan et al. 2005",
     ),
     (
         "difference_lines",
-        "line found by the iteration minus the line of Newton's method with the same model",
+        "line found by the iteration minus the line found by Newton's method with the same model",
     ),
 ];
 
 /// Meaning of a line of ISIS.
-pub(super) const ISIS_LINE: &str = "line in ISIS (qview, campt), 1 at the centre of the first line of the image file: before the adjustment with the \
-     original kernels (or support data) and the pointing bias of the site, after it with those of exchange/centre; missing outside the file";
+pub(super) const ISIS_LINE: &str = "line in ISIS (qview, campt), 1 at the centre of the first line of the image file; \
+                                    before the adjustment, with the original kernels (or support data) and the \
+                                    pointing bias of the site; after it, with the kernels and the bias of \
+                                    exchange/centre; missing outside the file";
 /// Meaning of a sample of ISIS.
-pub(super) const ISIS_SAMPLE: &str =
-    "sample in ISIS, 1 at the centre of the first pixel, with the same kernels as the line in ISIS";
+pub(super) const ISIS_SAMPLE: &str = "sample in ISIS, 1 at the centre of the first sample, with the same kernels as \
+                                      the line in ISIS";
 
 /// A line or sample of ISIS, if there is one.
 pub(super) fn isis(place: f64) -> Option<f64> {
@@ -242,7 +244,7 @@ fn names<'a>() -> Vec<Column<Registered<'a>>> {
         column(
             "profile",
             Unit::None,
-            "profile: window, orbit and crossing",
+            "identifier of the profile: window, orbit and crossing",
             Registered::profile,
         ),
         column(
@@ -281,7 +283,7 @@ fn places<'a>() -> Vec<Column<Registered<'a>>> {
         column(
             "line_offset",
             Unit::Line,
-            "lines from the middle of the header image, x of the papers",
+            "line offset from the middle of the header image, x of the papers",
             |point: &Registered| point.get(|points| &points.line_offset),
         ),
         column(
@@ -318,21 +320,21 @@ fn searches<'a>() -> Vec<Column<Registered<'a>>> {
         column(
             "evaluations",
             Unit::None,
-            "evaluations of the orientation by Newton's method",
+            "number of evaluations of the orientation in Newton's method",
             |point: &Registered| point.get(|points| &points.evaluations),
         ),
         column(
             "evaluations_frame_first",
             Unit::None,
-            "evaluations of the frame-first iteration with the second-order model; 0 outside the image's \
-            lines, and where it does not converge",
+            "number of evaluations in the frame-first iteration with the second-order model; 0 outside the image's \
+             lines, and where the iteration does not converge",
             |point: &Registered| point.get(|points| &points.evaluations_frame_first),
         ),
         column(
             "evaluations_fixed_point",
             Unit::None,
-            "evaluations of the iteration of eq. 4 of Shan et al. 2005 with the second-order model; 0 outside the \
-            image's lines, and where it does not converge",
+            "number of evaluations in the iteration of eq. 4 of Shan et al. 2005 with the second-order model; 0 \
+             outside the image's lines, and where the iteration does not converge",
             |point: &Registered| point.get(|points| &points.evaluations_fixed_point),
         ),
         column(

@@ -95,7 +95,7 @@ enum RowsError {
     #[cause(Configuration: "write Parquet, which also supports lists and groups, or select other columns")]
     Column { name: String, holds: String },
     #[error("the column {GEOMETRY} is missing or contains no points")]
-    #[cause(Input: "regenerate products of another version of areograph with this version")]
+    #[cause(Input: "if another version of areograph wrote the products, regenerate them with this version")]
     NoPoints,
     #[error("columns of these rows differ from those of earlier rows")]
     #[cause(like = NoPoints)]

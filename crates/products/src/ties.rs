@@ -150,13 +150,13 @@ fn measured_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column(
             "line",
             Unit::Line,
-            "measured line, 0 at the start of the first line of the header image, 0.5 at its centre",
+            "measured line, 0 at the outer edge of the first line of the header image, 0.5 at its centre",
             |row: &Measurement| row.line,
         ),
         column(
             "sample",
             Unit::Pixel,
-            "measured sample, 0 at the outer edge of the first pixel, 0.5 at its centre",
+            "measured sample, 0 at the outer edge of the first sample, 0.5 at its centre",
             |row: &Measurement| row.sample,
         ),
         column(
@@ -203,7 +203,7 @@ fn intersected_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column(
             "convergence_deg",
             Unit::Degree,
-            "largest angle between two rays, degrees",
+            "convergence: largest angle between two rays of the tie point, degrees",
             |row: &Measurement| Some(degrees(row.before?.0.convergence_rad)),
         ),
         column(
@@ -227,7 +227,7 @@ fn intersected_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column(
             "reprojection_px",
             Unit::Pixel,
-            "measured minus projected focal coordinate across the track, image pixels",
+            "measured minus projected focal-plane coordinate of the intersected point across the track, image pixels",
             |row: &Measurement| Some(row.before?.1.reprojection_px),
         ),
     ]
@@ -279,42 +279,43 @@ fn adjusted_sigma_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column(
             "sigma_x_m",
             Unit::Metre,
-            "standard deviation of adjusted_x_m, metres; in the published model only of the agreement between the images",
+            "standard deviation of adjusted_x_m, metres; with the published model, it states only the agreement of \
+             the images",
             |row: &Measurement| Some(sigma_m(row.adjusted?.0, 0)),
         ),
         column(
             "sigma_y_m",
             Unit::Metre,
-            "standard deviation of adjusted_y_m, metres; in the published model only of the \
-            agreement between the images",
+            "standard deviation of adjusted_y_m, metres; with the published model, it states only the agreement of \
+             the images",
             |row: &Measurement| Some(sigma_m(row.adjusted?.0, 1)),
         ),
         column(
             "sigma_z_m",
             Unit::Metre,
-            "standard deviation of adjusted_z_m, metres; in the published model only of the \
-            agreement between the images",
+            "standard deviation of adjusted_z_m, metres; with the published model, it states only the agreement of \
+             the images",
             |row: &Measurement| Some(sigma_m(row.adjusted?.0, 2)),
         ),
         column(
             "sigma_east_m",
             Unit::Metre,
-            "standard deviation of the adjusted point in east, metres; in the published model only of the agreement \
-             between the images",
+            "standard deviation of the adjusted point in east, metres; with the published model, it states only the \
+             agreement of the images",
             |row: &Measurement| Some(row.adjusted?.0.local_sigmas_m()[0]),
         ),
         column(
             "sigma_north_m",
             Unit::Metre,
-            "standard deviation of the adjusted point in north, metres; in the published model only of the agreement \
-             between the images",
+            "standard deviation of the adjusted point in north, metres; with the published model, it states only the \
+             agreement of the images",
             |row: &Measurement| Some(row.adjusted?.0.local_sigmas_m()[1]),
         ),
         column(
             "sigma_up_m",
             Unit::Metre,
-            "standard deviation of the height of the adjusted point, metres; in the published model only of the agreement \
-             between the images",
+            "standard deviation of the height of the adjusted point, metres; with the published model, it states only \
+             the agreement of the images",
             |row: &Measurement| Some(row.adjusted?.0.local_sigmas_m()[2]),
         ),
         column(
@@ -404,7 +405,8 @@ fn residual_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column(
             "adjusted_reprojection_px",
             Unit::Pixel,
-            "measured minus projected focal coordinate across the track with the adjusted orientation, image pixels",
+            "measured minus projected focal-plane coordinate across the track of the point intersected with the \
+             adjusted orientation, image pixels",
             |row: &Measurement| Some(row.after?.1.reprojection_px),
         ),
     ]

@@ -61,7 +61,7 @@ create_exception!(
     areograph,
     FileAccessError,
     AreographError,
-    "The operating system refused to read or write (exit code 6)."
+    "A file or folder could not be read or written (exit code 6)."
 );
 
 /// Interval at which signals are examined.

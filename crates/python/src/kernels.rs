@@ -91,7 +91,7 @@ pub(crate) fn spacecraft_states(
 
 /// An interval of time that ends before it begins.
 #[derive(Debug, thiserror::Error, Cause)]
-#[error("t0 is {first} and t1 is {last}; expected the first earlier than the second")]
+#[error("t0 is {first} and t1 is {last}; expected t0 earlier than t1")]
 #[cause(Configuration: "exchange t0 and t1")]
 struct Backwards {
     first: String,

@@ -66,7 +66,7 @@ pub(crate) fn search_shots(
     let time = time_s.map(|ends_s| ends_s.map(Et::from_seconds));
     if time.is_some_and(|[start, stop]| !(start <= stop)) {
         return Err(usage(format!(
-            "t0 and t1 are {time_s:?} seconds past J2000; expected the first time before the last"
+            "t0 and t1 are {time_s:?} seconds past J2000; expected t0 no later than t1"
         )));
     }
     let request = ShotRequest {
@@ -119,7 +119,7 @@ fn filter_of(
 ) -> PyResult<ShotFilter> {
     if !(off_nadir_max_deg > 0.0 && off_nadir_max_deg <= ShotFilter::OFF_NADIR_LIMIT_DEG) {
         return Err(usage(format!(
-            "max_off_nadir_deg is {off_nadir_max_deg}; expected above 0 to {}",
+            "max_off_nadir_deg is {off_nadir_max_deg}; expected a number above 0, up to {}",
             ShotFilter::OFF_NADIR_LIMIT_DEG
         )));
     }

@@ -92,7 +92,7 @@ fn overview(adjusted: &Adjusted) -> Markup {
             (of(&counted(summary.ties.corrections_m[0].n as usize, "tie point"), "/ties/corrections_m/0/n"))
             " adjusted together in " (of(&counted(summary.steps, "iteration"), "/steps")) "; "
             (of(&summary.degrees_of_freedom.to_string(), "/degrees_of_freedom"))
-            " degrees of freedom. Unit-weight σ of tie points " (of(&label(along, 3), "/tie_components/0"))
+            " degrees of freedom. σ0 of tie points " (of(&label(along, 3), "/tie_components/0"))
             " along track (" (against_configured(along)) "), " (of(&label(across, 3), "/tie_components/1"))
             " across (" (against_configured(across)) "). σ0 of all observations: "
             (of(&label(summary.sigma0, 3), "/sigma0")) "."
@@ -101,8 +101,8 @@ fn overview(adjusted: &Adjusted) -> Markup {
             p {
                 "Tie points scatter by " (of(&label(summary.tie_scatter_px, 2), "/tie_scatter_px"))
                 " px along the track in addition to their stated σ, as expected from attitude \
-                 jitter. The σ of the adjustment include this scatter along the track and 1.4 times as much (at most 1.5 px) \
-                 across the track, where residuals do not reveal it."
+                 jitter. The standard deviations include this scatter along the track, and 1.4 times as much (at most \
+                 1.5 px) across the track, where residuals do not reveal it."
             }
         }
     }
@@ -198,8 +198,9 @@ fn observations(summary: &AdjustmentSummary, terms: &Terms<'_>) -> Markup {
         );
     }
     let words = format!(
-        "Variance component: √(vᵀPv / redundancy), 1 where the a priori σ is correct; by chance: 99 % interval of the \
-         component, lower for heights with robust weights. Beyond {BAARDA_LIMIT}: Baarda's test failed, by chance 1 in 1000."
+        "Variance component: √(vᵀPv / redundancy), near 1 if the a priori σ is correct. By chance: 99 % interval of \
+         the component, lower for heights with robust weights. Beyond {BAARDA_LIMIT}: number that fails Baarda's \
+         test, by chance 1 in 1000."
     );
     html! { (table.finish()) p { (words) } (outside(summary, terms)) }
 }
@@ -220,12 +221,12 @@ fn outside(summary: &AdjustmentSummary, terms: &Terms<'_>) -> Markup {
     let sentences = [
         (
             listed(TypeSummary::is_above_chance),
-            "Above their interval (a priori standard deviations too small)",
+            "Variance components above their interval (a priori standard deviations are too small)",
         ),
         (
             listed(TypeSummary::is_below_chance),
-            "Below their interval (a priori standard deviations larger than the scatter, or robust weights; covariances are not \
-             reduced)",
+            "Variance components below their interval (a priori standard deviations are larger than the scatter, or \
+             weights are robust; covariances are not reduced)",
         ),
     ];
     html! {

@@ -125,7 +125,7 @@ fn over_time(ranges: &ArchiveRanges) -> Result<Markup> {
     };
     let ranges_plot = Plot::of(
         "Ranges over time".to_owned(),
-        "Mean of range − distance without outliers, and its robust spread, for every profile. Dashed: limits."
+        "Mean (without outliers) and robust spread (NMAD) of range − distance for every profile. Dashed: limits."
             .to_owned()
             + &thinning,
         "days since the first profile",
@@ -158,8 +158,9 @@ fn over_time(ranges: &ArchiveRanges) -> Result<Markup> {
     let scan_plot = Plot::of(
         "Clock correction over time".to_owned(),
         format!(
-            "Time-tag correction that minimises the spread of the ranges of a profile, with raw or crossover-corrected radii; \
-             drawn where the uncertainty is below {KNOWN_S} s. The horizontal line is the correction used, {} s.",
+            "Time-tag correction that minimises the spread of range − distance of a profile, with raw or \
+             crossover-corrected radii; drawn where the uncertainty is below {KNOWN_S} s. The horizontal line is the \
+             correction used, {} s.",
             label(used_s, 3)
         ),
         "days since the first profile",
@@ -246,7 +247,7 @@ fn map(ranges: &ArchiveRanges, worst: &[WorstProfile<'_>]) -> Result<Markup> {
         .collect();
     let mut plot = Plot::of(
         "Locations of the profiles".to_owned(),
-        "Selected shots of every profile, IAU 2000, areocentric; crosses mark the worst profiles beyond a \
+        "Some shots of every profile, IAU 2000, areocentric; crosses mark the worst profiles beyond a \
          limit.".to_owned(),
         "east longitude, degrees",
         vec![Panel::of(
@@ -277,8 +278,8 @@ fn not_checked(ranges: &ArchiveRanges) -> Markup {
         "The kernels contain a position for every shot.".to_owned()
     } else {
         format!(
-            "The kernels contain no position for {} shots: {without} profiles could not be checked, {partly} only in \
-             part. In profiles.parquet their not_covered is above 0.",
+            "The kernels contain no position for {} shots: {without} profiles could not be checked, and {partly} only \
+             in part. Column not_covered of profiles.parquet counts these shots.",
             grouped(ranges.sum(|file| file.not_covered))
         )
     };
@@ -300,7 +301,7 @@ fn not_checked(ranges: &ArchiveRanges) -> Markup {
     html! {
         p { (coverage) }
         @if !ranges.failures.is_empty() {
-            p { "Files not read, or not read again, " (ranges.failures.len()) " in all:" }
+            p { "Files that could not be read, or read again (" (ranges.failures.len()) "):" }
             ul {
                 @for failure in ranges.failures.iter().take(LISTED) { li { (failure.file) ": " (failure.why) } }
             }
@@ -323,7 +324,7 @@ fn not_checked(ranges: &ArchiveRanges) -> Markup {
 fn how(ranges: &ArchiveRanges) -> Markup {
     let positions = format!(
         "Positions are interpolated with Chebyshev polynomials to within {TRAJECTORY_TOLERANCE_M} m of CSPICE; the \
-         largest difference at independent instants is {:.1e} m. States are geometric.",
+         largest difference at independent instants was {:.1e} m. States are geometric.",
         ranges.trajectory_error_m()
     );
     let clock = format!(

@@ -54,8 +54,8 @@ fn lead(config: &CalibrationConfig, of: &Calibration) -> Markup {
     let mode = match config.solution.mode {
         CalibrationMode::Differential => "",
         CalibrationMode::AsPublished => {
-            " All angles were estimated from tie points only, as published, which can displace the camera by large \
-             amounts: see the figures after step ties."
+            " All angles were estimated from tie points only, as published. This method can displace the camera by \
+             large amounts: see the residuals after step ties."
         }
     };
     let mut words = accuracy + mode;
@@ -75,9 +75,10 @@ fn stated(of: &HeldBack) -> String {
     let times =
         |of: Option<Scattered>| of.map_or_else(|| "–".to_owned(), |of| format!("{:.2}", of.sigmas));
     format!(
-        "A tie point is known to {} in the plane and {} in height (root mean square). Validation by {}, withheld: \
-         differences are {} times the expected amount in the plane and {} times in height; for the {} points in two lines or \
-         more, they are {} in the plane and {} in height, including laser errors.",
+        "The root mean square standard deviation of tie points is {} in plan and {} in height. Validation by {}, \
+         withheld: root mean square residuals are {} times their expected value in plan and {} times in height. \
+         For the {} points in two lines or more, the root mean square difference from the laser is {} in plan \
+         and {} in height, including laser errors.",
         metres(of.accuracy_plane_m),
         metres(of.accuracy_height_m),
         counted(
@@ -128,7 +129,8 @@ fn control_cells(of: &ControlFigures) -> [Cell; 3] {
 
 fn steps(of: &Calibration) -> Markup {
     let mut table = Table::new(
-        "Root mean squares, as in table 5 of Li et al. 2023: tie points in the worst line, control line by line",
+        "Root mean square residuals, as in table 5 of Li et al. 2023: tie points in the worst line, control in each \
+         line",
         &[
             Column::Text("after"),
             Column::Text("control"),
@@ -201,10 +203,10 @@ fn residuals(of: &Calibration) -> Result<Markup> {
 fn sight(of: &Calibration) -> Markup {
     let unseen = usize::try_from(of.tie_sight.unseen).unwrap_or(usize::MAX);
     let words = format!(
-        "Of {} offset angles, tie points leave {} undetermined: {}. A priori values constrain these combinations; \
+        "Tie points leave {} of the {} offset angles undetermined: {}. A priori values constrain these combinations; \
          without these constraints, an adjustment leaves them arbitrary.",
-        3 * of.cameras.len(),
         counted(unseen, "combination"),
+        3 * of.cameras.len(),
         of.tie_sight.unseen_words()
     );
     let mut table = Table::new(
@@ -241,8 +243,8 @@ fn on_ground(of: &Calibration) -> Markup {
     paragraph(&format!(
         "Tie points do not reveal measurement errors along the flight, which change heights. The heights of {} tie \
          points were \
-         compared with the ground between laser points. Tie points farther than {limit_m:.0} m from this ground (median of {:.1} \
-         standard deviations) were rejected; smaller errors are not identified.",
+         compared with the ground between laser points. Tie points more than {:.1} standard deviations (median \
+         {limit_m:.0} m) above or below this ground were rejected; smaller errors are not identified.",
         ground.tested, ground.limit_sigmas
     ))
 }
@@ -289,8 +291,9 @@ fn cameras(of: &Calibration) -> Markup {
     });
     let words = format!(
         "Offset angles, constant look-angle terms and constant orbit errors are nearly indistinguishable, so their individual σ \
-         are large; their combined effect is far better known. The orbit drifts by {} m per image line along body-fixed X, Y, Z. \
-         Support data describe a straight line of equal samples; the last column states the residual of this description.",
+         are large; their combined effect is far better known. The correction of the given orbit changes by {} m per \
+         image line along body-fixed X, Y, Z. Support data describe a straight line of equal samples; the last column \
+         states the residual of this description.",
         drift.join(", ")
     );
     html! { (table.finish()) p { (words) } }

@@ -43,8 +43,8 @@ fn numbers(of: &Rounds) -> Markup {
             Column::Number("model − laser (median), m"),
             Column::Number("control, px"),
             Column::Number("withheld control, px"),
-            Column::Number("withheld, σ in the plane"),
-            Column::Number("σ in height"),
+            Column::Number("withheld, RMS / expected, plane"),
+            Column::Number("RMS / expected, height"),
         ],
     );
     for round in &of.rounds {

@@ -54,7 +54,8 @@ fn biases(site: &SiteProducts) -> Markup {
                 name.into(),
                 signed(of.bias.seconds(), 3).into(),
                 format!(
-                    "the time at which the attitude is read; position and {body} remain at the time of exposure"
+                    "the time at which the attitude is read; the position and the rotation of {body} are those at the \
+                     exposure"
                 )
                 .into(),
                 of.source.into(),
@@ -100,7 +101,7 @@ const fn datum_columns(file: &'static str) -> [Column; 8] {
         Column::Text("version"),
         Column::Text("datum of the file"),
         Column::Number("W0, degrees"),
-        Column::Text("done"),
+        Column::Text("transformation"),
         Column::Number("shots"),
         Column::Number("mean shift, m"),
         Column::Number("mean longitude change, degrees"),

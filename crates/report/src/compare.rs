@@ -76,7 +76,7 @@ fn lead(comparison: &KernelComparison) -> Markup {
         (Tone::Remarks, headline)
     } else if !close.is_empty() {
         let headline = format!(
-            "Not decided: {} ({} m) and {} are nearly equally far from the mean orbit.",
+            "Not decided: {} ({} m) and {} are nearly equally far from the mean orbit (root mean square).",
             closest.set,
             label(closest.size.rms, 3),
             close.join(" and ")
@@ -105,15 +105,15 @@ fn lead(comparison: &KernelComparison) -> Markup {
     };
     let pulls = orbit.pulls_the_mean().map_or_else(String::new, |far| {
         format!(
-            "{} lies {} m from the mean, farther than all others, and biases this mean. ",
+            "{} lies {} m (root mean square) from the mean, farther than all others, and biases this mean. ",
             far.set,
             label(far.size.rms, 3)
         )
     });
     let words = format!(
         "{pulls}{} epochs from {} to {} UTC, equally spaced over the time that all sets cover. Geometric positions of {} \
-         relative to Mars, each set minus the mean of all sets, in the axes of the mean orbit. The rule follows Shan et al. \
-         2005: least root mean square distance.",
+         relative to Mars, each set minus the mean of all sets, in the axes of the mean orbit. The criterion is that \
+         of Shan et al. 2005: the least root mean square distance.",
         whole(orbit.epochs.len()),
         comparison.utc[0],
         comparison.utc[1],
@@ -133,7 +133,7 @@ fn elsewhere(orbit: &Comparison) -> String {
     let others = stretches.iter().enumerate().filter_map(|(index, stretch)| {
         let (of, [least_m, own_m]) = orbit.closer_within(*stretch)?;
         Some(format!(
-            " In stretch {} of {}, {} is closer ({} m; {}: {} m).",
+            " In stretch {} of {}, {} is closer (root mean square distance {} m; {}: {} m).",
             index + 1,
             stretches.len(),
             of.set,

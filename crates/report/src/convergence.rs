@@ -109,7 +109,8 @@ fn convergence_plot(image: &ImageProducts) -> Plot {
         Series::line(name(run), colour, logarithms.collect())
     });
     let words =
-        "Mean step of the footprints within the image's lines; 0 after convergence.".to_owned();
+        "Mean absolute step over the footprints within the image's lines; the step of a converged footprint counts as \
+         0.".to_owned();
     Plot::of(
         format!("Convergence on {}", image.times.id),
         words,

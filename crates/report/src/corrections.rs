@@ -83,8 +83,8 @@ fn positions(site: &SiteProducts, adjusted: &Adjusted) -> Markup {
         (line_times(adjusted))
         @if starts_at_pedr {
             p {
-                "Shifts are relative to the orbit in the kernels; with a simultaneous profile, the expected orbit is the orbit \
-                 of the shots (adjustment.orbit_of_pedr)."
+                "Shifts are relative to the orbit in the kernels; with a simultaneous profile, the a priori orbit is \
+                 the orbit of the shots (adjustment.orbit_of_pedr)."
             }
         }
     }
@@ -97,7 +97,7 @@ fn line_times(adjusted: &Adjusted) -> Markup {
     html! {
         @if largest_s > 0.0 {
             p {
-                "±: a posteriori σ of the camera at the exposure of a line. Line times are known to ±"
+                "±: a posteriori σ of the camera position at the exposure of a line. Line times are known to ±"
                 (label(largest_s / SECONDS_PER_MS, 0)) " ms; along the track they cannot be \
                  separated from position and rotation, which must be used together."
             }
@@ -152,7 +152,7 @@ fn rotations(site: &SiteProducts, adjusted: &Adjusted) -> Markup {
     let inseparable = if adjusted.summary.correlated.is_empty() {
         ""
     } else {
-        " In a narrow field of view, position and rotation are nearly indistinguishable."
+        " With a narrow field of view, position and rotation are nearly indistinguishable."
     };
     html! { (table.finish()) p { "±: a posteriori σ." (inseparable) } }
 }

@@ -59,7 +59,7 @@ fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<Markup> {
 
 /// Reason why absolute accuracies are withheld.
 pub(super) const WITHHELD_BECAUSE: &str =
-    "the a priori accuracy of orbit and attitude belongs to another spacecraft";
+    "the a priori accuracy of orbit and attitude is that of another spacecraft";
 
 /// The three statements of accuracy, and their basis.
 fn statements(
@@ -97,7 +97,7 @@ fn statements(
             after.map_or_else(nothing, |after| {
                 format!("{after}; residuals {} σ", label(along, 2))
             }),
-            "agreement of the images along the track; not a measure of height or position"
+            "agreement of the images along the track; not a measure of the accuracy of height or position"
                 .to_owned(),
         ],
         [
@@ -123,7 +123,7 @@ fn statements(
         table.row(true, cells.map(Cell::from));
     }
     let relief = if is_withheld && adjustment.adjusted.heights.is_some() {
-        html! { p { "The accuracy of position by relief is withheld: " (WITHHELD_BECAUSE) "." } }
+        html! { p { "The accuracy of the position from relief is withheld: " (WITHHELD_BECAUSE) "." } }
     } else {
         relief::relief(adjustment.adjusted, known_beforehand(geometric))
     };
@@ -226,7 +226,7 @@ pub(super) fn absolute(
         if is_open(geometric, adjustment) {
             format!("; open: {half}, because neither image is known to be correct")
         } else {
-            format!("; {half}, is within these")
+            format!("; {half}, is within these standard deviations")
         }
     });
     [
@@ -286,7 +286,8 @@ fn surface_in_words(surface: &SurfaceFigures) -> Markup {
             (of(&counted(surface.profiles, "profile"), "profiles"))
             "; roughness " (of(&label(surface.roughness_m, 1), "roughness_m")) " m RMS over 300 m, slope "
             (of(&label(surface.slope, 3), "slope"))
-            " per axis. Errors at neighbouring tie points are correlated, so averaging hardly reduces them."
+            " per axis. Errors of the surface at neighbouring tie points are correlated, so averaging hardly reduces \
+             them."
         }
     }
 }
@@ -404,7 +405,7 @@ fn apart(check: &HeightCheck) -> Markup {
     let mean_m = label(apart.mean_m.abs(), 1);
     html! {
         p {
-            "At the tie points the surface interpolated from " (upper) " alone lies "
+            "At the tie points, the surface interpolated from " (upper) " alone lies on average "
             (traced(&mean_m, "|adjustment.json#/before/heights/profiles_apart/mean_m"))
             " m above the surface from " (lower) " alone (expected σ "
             (traced(&label(apart.sigma_m, 1), "adjustment.json#/before/heights/profiles_apart/sigma_m")) " m)."

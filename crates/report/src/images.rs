@@ -139,14 +139,15 @@ fn light_time(site: &SiteProducts) -> Markup {
         };
         if of_images().next().is_some() {
             words += &format!(
-                " With {word}, the view shifts by {} m on the ground, and a ground point by {} lines.",
+                " With convention {word}, the view shifts by {} m on the ground, and a ground point shifts by {} \
+                 lines in the image.",
                 span(|of| of.ground_m, 1),
                 span(|of| of.lines, 2)
             );
         }
     }
     words +=
-        " Files in exchange/centre follow the convention of ISIS and ALE, centre, in every run.";
+        " Files in exchange/centre follow the convention of ISIS and ALE (centre) in every run.";
     paragraph(&words)
 }
 

@@ -46,7 +46,7 @@ fn lead(of: &LaserMatch) -> Markup {
         |held_out| {
             format!(
                 "{}, withheld from every search, differ from the model by {:.1} m without the shift of their unit and by {:.1} m \
-                 with this shift (root mean square, without the bias of the other shots).",
+                 with this shift (root mean square about the bias of the other shots).",
                 counted(held_out.shots, "shot"),
                 held_out.before_m,
                 held_out.after_m
@@ -69,7 +69,7 @@ fn lead(of: &LaserMatch) -> Markup {
     let [east_m, north_m] = of.cell_m;
     let made = format!(
         "{} in {}, {} of {} segments with relief, cells of {east_m:.1} by {north_m:.1} m, heights above a radius of {} m. \
-         The measure was {}.",
+         The measure of similarity was {}.",
         counted(of.shots, "shot"),
         counted(of.tracks, "pass"),
         of.segments_kept,
@@ -115,7 +115,7 @@ fn map(of: &LaserMatch) -> Result<Markup> {
     ];
     let mut plot = Plot::of(
         "Shifts of the model".to_owned(),
-        "From the position of a unit according to the laser to its position in the model."
+        "Arrows lead from the position of a unit according to the laser to its position in the model."
             .to_owned(),
         "east longitude, degrees",
         vec![Panel::of("latitude, degrees", series)],
@@ -155,7 +155,7 @@ fn held_out(of: &LaserMatch) -> Result<Markup> {
     ];
     let plot = Plot::of(
         "Model minus laser at withheld shots".to_owned(),
-        "Root mean square of every fourth shot of a kept unit, without the bias of the other shots."
+        "Root mean square over every fourth shot of each kept unit, about the bias of the other shots."
             .to_owned(),
         "unit",
         vec![Panel::of("root mean square, m", series)],

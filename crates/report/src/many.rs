@@ -190,7 +190,7 @@ fn table(site: &SiteProducts, quantities: &[Quantity]) -> Markup {
     let words = match invalid.count() {
         0 => "All images are valid.".to_owned(),
         count => format!(
-            "{} of {} images are not valid.",
+            "Invalid images: {} of {}.",
             whole(count),
             whole(site.images.len())
         ),

@@ -90,7 +90,7 @@ fn without_outline(site: &SiteProducts) -> Markup {
         count if many::are_many(site) => counted(count, "image"),
         _ => missing.join(", "),
     };
-    html! { p { "Not drawn, because a corner shows no ground: " (named) "." } }
+    html! { p { "Not drawn, because an image corner shows no ground: " (named) "." } }
 }
 
 fn figure(site: &SiteProducts, shown: Shown, only: bool) -> Result<Markup> {

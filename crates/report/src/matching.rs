@@ -88,8 +88,9 @@ fn write(site: &SiteProducts, ties: &Ties) -> Markup {
     html! {
         p {
             "In each cell of common ground, the point with the strongest texture was matched to the other image and back. \
-             σ: medians of \
-             single matches, in the second image. The table shows the second pass, which starts from the adjusted orientation."
+             σ: medians \
+             of the standard deviations of single matches, in the second image. The table shows the second pass, \
+             which started from the adjusted orientation."
         }
         (some_of_all(&ties.matched, &matched))
         (table.finish())

@@ -73,7 +73,10 @@ fn read(geometric: &GeometricProducts) -> Markup {
     let adjusted = geometric.adjustment;
     let adjusted = adjusted.map(|adjustment| adjustment.intersected.points.len().to_string());
     let counts = [
-        (elsewhere, "measurements are in other images."),
+        (
+            elsewhere,
+            "measurements are in images that the site does not contain.",
+        ),
         (ties.ignored, "measurements are marked to be ignored."),
         (ties.complaint_count, "records could not be read."),
     ];
@@ -142,8 +145,8 @@ const fn rejection(reason: TieRejection) -> &'static str {
             Unintersected::FewRays { .. } => "measured in one image only",
             Unintersected::NearParallel { .. } => "rays too close to parallel",
             Unintersected::IllConditioned => "rays do not determine the point",
-            Unintersected::BehindCamera { .. } => "rays meet behind a camera",
-            Unintersected::Height { .. } => "rays meet far from the ellipsoid",
+            Unintersected::BehindCamera { .. } => "rays intersect behind a camera",
+            Unintersected::Height { .. } => "rays intersect far from the ellipsoid",
             Unintersected::NotConverged => "the iteration did not converge",
         },
         TieRejection::Unseen => "an image does not show the intersected point",
@@ -230,7 +233,8 @@ fn reprojection(pairs: &[BeforeAfter]) -> Markup {
 
 fn footprints(pairs: &[BeforeAfter]) -> Markup {
     let mut table = Table::new(
-        "Footprints between the images, from tie points; positive along track; samples include relief parallax",
+        "Misregistration of footprints according to tie points; lines are positive along track; samples include \
+         relief parallax",
         &[
             Column::Text("profile"),
             Column::Text("pair"),

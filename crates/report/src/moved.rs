@@ -108,8 +108,8 @@ fn footprints(before: &ImageProducts, after: &ImageProducts) -> Option<Plot> {
         each: shown,
     });
     let words = format!(
-        "Footprints near the middle, flight to the right. Median shift of all {} within the image's lines, inside or beside: \
-         {} lines, {} samples.",
+        "Footprints near the middle; flight to the right. Median shift of all {} within the image's lines, inside the \
+         image or beside it: {} lines, {} samples.",
         whole(all.len()),
         label(lines, 2),
         label(across, 2)

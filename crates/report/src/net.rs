@@ -307,9 +307,10 @@ fn blunders(net: &Triangulation) -> Markup {
     } else {
         ""
     };
-    let words = "Flagged measurements are beyond 3.5 robust standard deviations (from the median) of their brick. A \
-        measurement is rejected when its deviation in the adjustment of the whole net, divided by its standard deviation, \
-        exceeds the largest value expected by chance in one net of a hundred.";
+    let words = "Flagged measurements deviate by more than 3.5 robust standard deviations, computed from the median \
+                 of their brick. A measurement is rejected when its deviation in the adjustment of the whole net, \
+                 divided by its standard deviation, exceeds a value that the largest of a net exceeds by \
+                 chance in only one net in a hundred.";
     html! { (table.finish()) p { (words) (both_go) } }
 }
 

@@ -27,7 +27,7 @@ fn write(site: &SiteProducts) -> Markup {
     html! {
         (list(notes))
         @if notes.len() < site.notes.len() {
-            p { (notes.len()) " of " (whole(site.notes.len())) " shown; manifest.json has all." }
+            p { (notes.len()) " of " (whole(site.notes.len())) " shown; manifest.json lists all." }
         }
         @if !shown.is_empty() {
             h3 { "Problems in the input" }

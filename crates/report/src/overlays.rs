@@ -35,8 +35,8 @@ fn write(site: &SiteProducts) -> Result<Markup> {
         return Ok(Markup::default());
     };
     let words = format!(
-        "{} with footprints and tie points on the pixels, before and after the adjustment, and {} on the ground in pairs of \
-         images: ",
+        "{} with footprints and tie points marked on the pixels, before and after the adjustment, and {} on the \
+         ground as pairs of images show them: ",
         html::counted(overlays.images.len(), "image"),
         html::counted(overlays.places.len(), "place"),
     );
@@ -94,7 +94,7 @@ fn lead(site: &SiteProducts) -> Markup {
         p {
             "Numbers count the shots of a profile, from 1. The middle of each mark is open. Image patches show the \
              same ground at the same position, north up; dark violet marks areas beyond the image or without data. In \
-             composites of two images the first is red and the second cyan, so that coincident ground is grey."
+             composites of two images, the first is red and the second cyan, so that coincident ground is grey."
         }
     }
 }
@@ -115,8 +115,8 @@ fn strip_figure(site: &SiteProducts, shown: &ShownImage, picture: &Picture) -> M
     let id = &image.times.id;
     let inside = image.registration.points.inside_count();
     let mut words = format!(
-        "{id}, {} lines of {} samples, {} × {} of them per pixel; line 0 is at the top. {} inside according to the \
-        kernels",
+        "{id}, {} lines of {} samples; one pixel of the picture is {} × {} pixels of the image; line 0 is at the top. \
+         {} inside according to the kernels",
         whole(image.times.line_times.lines()),
         whole(image.times.samples),
         picture.reduction,
@@ -215,7 +215,11 @@ fn caption(site: &SiteProducts, place: &Place) -> String {
     });
     let moved: Vec<String> = moved.collect();
     if !moved.is_empty() {
-        let _infallible = write!(words, " The adjustment moves it {}.", moved.join(", "));
+        let _infallible = write!(
+            words,
+            " The adjustment moved the point {}.",
+            moved.join(", ")
+        );
     }
     words
 }

@@ -30,7 +30,7 @@ fn write(site: &SiteProducts) -> Result<Markup> {
     Ok(html! {
         p {
             "Every stretch of a profile is withheld in turn and predicted from the other profiles, in the same way as the ground \
-             under tie points. The stretch is not used in its prediction."
+             under tie points."
         }
         @if let Some(score) = &check.score {
             (table(score))
@@ -105,10 +105,10 @@ fn plot(stretches: &[WithheldStretch]) -> Plot {
         },
         ..Plot::of(
             "Withheld stretches above the surface".to_owned(),
-            "Mean of measured minus predicted heights of each stretch, in stated σ, against the distance of the nearest shot of \
-             another profile. Lines: stated intervals of 95 and 99.7 %."
+            "Mean of measured minus predicted heights of each stretch, divided by its stated σ, against the distance \
+             to the nearest shot of another profile. Lines: stated intervals of 95 and 99.7 %."
                 .to_owned(),
-            "distance of the nearest shot, km",
+            "distance to the nearest shot, km",
             vec![panel],
         )
     }

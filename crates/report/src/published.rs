@@ -28,9 +28,9 @@ fn departure(summary: &AdjustmentSummary) -> &'static str {
     match summary.model {
         AdjustmentModel::Published => {
             "Across the track, this is not the published model: residuals refer to the line that sees the point, whereas \
-             Yoon & Shan 2004 use the measured line. Their across-track means of MOLA, −2.711 to 3.286 px at Gusev and Isidis, \
-             result from the skew of the flight in the measured line and vanish here. Their σ0 of 1.01 to 1.06 is not \
-             comparable."
+             Yoon & Shan 2004 use the measured line. Their across-track mean corrections of MOLA footprints, −2.711 \
+             to 3.286 px at Gusev and Isidis, result from the skew of the flight against the measured line and vanish \
+             here. Their σ0 of 1.01 to 1.06 is not comparable."
         }
         AdjustmentModel::MolaSurface => {
             "In this model, image coordinates of footprints are not observations; their rows are empty. The published model \

@@ -80,8 +80,8 @@ fn untested(site: &SiteProducts) -> Markup {
     html! {
         p {
             "The ranges are not tested: the tables contain no spacecraft position, and no kernels cover the shots. The \
-             spacecraft is placed on the radius through the footprint (nadir by range): its distance from the footprint \
-             equals the range."
+             spacecraft is placed on the radius through the footprint (nadir by range), so that its distance from the \
+             footprint equals the range."
         }
         (table.finish())
     }
@@ -222,8 +222,8 @@ fn limits(site: &SiteProducts) -> Markup {
             "Judged: profiles with at least " (traced(&limits.shots_min.to_string(), "ranges.json#/limits/shots_min"))
             " shots. Limits: at most "
             (traced(&number(100.0 * limits.outlier_share_max, 1), "ranges.json#/limits/outlier_share_max*100"))
-            " % outliers (beyond " (traced(&limits.outlier_sigma.to_string(), "ranges.json#/limits/outlier_sigma"))
-            " robust σ of the median). Bars: used share of a limit."
+            " % outliers (more than " (traced(&limits.outlier_sigma.to_string(), "ranges.json#/limits/outlier_sigma"))
+            " robust σ from the median). Bars: used share of a limit."
         }
     }
 }
@@ -329,7 +329,8 @@ fn three_ways(site: &SiteProducts) -> Markup {
         ul {
             li { "Limits apply to means without outliers." }
             @if site.config.shots.is_empty() {
-                li { "Crossover radius: the MOLA team's adjustment, which moves footprints, not ranges." }
+                li { "Crossover radius: from the MOLA team's adjustment, which changes radii of footprints, not \
+                      ranges." }
             }
             li {
                 "Orbit of the shots: the orbit in the " (site.config.terms().shot_source()) ", without kernels; a mean beyond ±"
@@ -337,9 +338,9 @@ fn three_ways(site: &SiteProducts) -> Markup {
                 " m indicates a reading error."
             }
             li {
-                "Shots − kernels: spacecraft positions, inertial axes; beyond "
+                "Shots − kernels: difference of spacecraft positions, inertial axes; more than "
                 (traced(&limits.orbit_max_m.to_string(), "ranges.json#/limits/orbit_max_m"))
-                " m, orbit, clock or datum differ."
+                " m indicates a different orbit, clock or datum."
                 // A table's own spacecraft and the spacecraft of support data are not tabulated.
                 @if error_m > 0.0 {
                     " Trajectory tabulated to "

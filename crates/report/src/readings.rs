@@ -82,7 +82,8 @@ impl Readings {
             sentences.push("Both causes together are more probable than either alone.".to_owned());
         }
         sentences.push(format!(
-            "A decision requires odds of at least {DECISIVE_ODDS} to 1, and both causes together must be less probable."
+            "A decision requires odds of at least {DECISIVE_ODDS} to 1; both causes together must not be more \
+             probable than either alone."
         ));
         sentences
     }
@@ -121,8 +122,9 @@ pub fn readings_page(readings: &Readings) -> Result<String> {
     };
     let sigmas = &readings.sigmas;
     let words = format!(
-        "A priori standard deviations: large errors of single images as line times of {} ms, small ones as rotations of {}\u{2033}, \
-         both within a factor of √2; clock offset {} s. Offset of the attitude clock, if it is the cause: {}.",
+        "A priori standard deviations: {} ms of line time for large errors of single images, {}\u{2033} of rotation \
+         for small ones (and 1/√2 and √2 times these values, equally likely), and {} s for the clock offset. Offset \
+         of the attitude clock, if it is the cause: {}.",
         label(sigmas.line_time_s / SECONDS_PER_MS, 1),
         label(sigmas.rotation_rad / RADIANS_PER_ARCSECOND, 1),
         label(sigmas.clock_s, 2),
@@ -183,8 +185,9 @@ fn pairs(readings: &Readings) -> Result<Markup> {
             Series::dots("pairs", 0, dots),
         ],
     );
-    let caption = "Displacement of the images of each pair against its change with the attitude clock. One offset places the pairs \
-                   on a line through 0; independent errors of single images scatter them about 0.";
+    let caption = "Displacement between the images of each pair against the change of this displacement with the \
+                   attitude clock. One offset places the pairs on a line through 0; independent errors of single \
+                   images scatter the pairs about 0.";
     let plot = Plot::of(
         "Displacement and attitude clock".to_owned(),
         caption.to_owned(),
@@ -192,8 +195,8 @@ fn pairs(readings: &Readings) -> Result<Markup> {
         vec![panel],
     );
     let words = paragraph(
-        "Positions of tie points according to the two images, with the orientation from the kernels. Images that \
-         follow nadir are displaced by an offset of the attitude clock; inertially held images are not.",
+        "Tie-point positions of the first image minus those of the second, with the orientation from the kernels. \
+         Images that follow nadir are displaced by an offset of the attitude clock; inertially held images are not.",
     );
     Ok(html! { (words) (table.finish()) (figure(&plot)?) })
 }

@@ -116,12 +116,12 @@ fn profiles(site: &SiteProducts, images: &[Indexed]) -> Markup {
     let mut words = Vec::new();
     if elsewhere > 0 {
         words.push(format!(
-            "Not listed: {elsewhere} profiles without a footprint in an image."
+            "Not listed: {elsewhere} pairs of a profile and an image without any of its footprints."
         ));
     }
     if rejected > 0 {
         words.push(format!(
-            "{rejected} footprints cannot be projected (behind the camera or beyond the horizon)."
+            "Failed projections of footprints into images: {rejected} (behind the camera or beyond the horizon)."
         ));
     }
     html! { (table.finish()) (paragraph(&words.join(" "))) }

@@ -159,7 +159,7 @@ impl Controlled {
 pub(super) fn redundancy(site: &SiteProducts, adjusted: &Adjusted) -> Markup {
     let all = Controlled::all(site, adjusted);
     let mut table = Table::new(
-        "Redundancy: fraction of a gross error visible in its own residual",
+        "Redundancy: fraction of a gross error that appears in the residual of its observation",
         &[
             Column::Text("observation"),
             Column::Number("number"),
@@ -181,7 +181,7 @@ pub(super) fn redundancy(site: &SiteProducts, adjusted: &Adjusted) -> Markup {
         };
         if found.mean < SHOWN {
             sentences.push(format!(
-                "Only {mean} of a gross error in a {} appears in the residual: {consequence}.",
+                "On average, only {mean} of a gross error of a {} appears in its residual: {consequence}.",
                 of.name
             ));
         }
@@ -197,7 +197,8 @@ pub(super) fn redundancy(site: &SiteProducts, adjusted: &Adjusted) -> Markup {
             ],
         );
     }
-    let words = "Shown: the redundancy number r; detectable by Baarda's test (3.29, power 80 %): 4.13 σ/√r.";
+    let words = "Shown: redundancy number r. Smallest error detectable by Baarda's test (limit 3.29, power 80 %): \
+                 4.13 σ/√r with the mean r.";
     let table = html! { (table.finish()) p { (words) } };
     html! {
         @for sentence in sentences { p { (sentence) } }
@@ -223,8 +224,8 @@ pub(super) fn correlations(summary: &AdjustmentSummary) -> Markup {
     };
     let sum = if *largest < 0.0 { "sum" } else { "difference" };
     let words = format!(
-        "{} correlate by more than 0.95, most of all {first} and {second} ({}): only their {sum}, each divided by its σ, is \
-         determined. Do not interpret the individual values.",
+        "{} correlate by more than 0.95, most of all {first} and {second} ({}): only the {sum} of the two unknowns, \
+         each divided by its σ, is well determined. Do not interpret the individual values.",
         counted(all.len(), "pair") + " of unknowns",
         label(*largest, 4)
     );

@@ -97,7 +97,8 @@ pub(super) fn distribution(adjusted: &Adjusted) -> Result<Markup> {
             .count()
     };
     let words = format!(
-        "Share of tie point residuals below each value, in units of σ. Beyond {}: {} of {} along track, {} of {} across.",
+        "Share of tie-point residuals below each value; each residual is divided by its own σ. Beyond ±{}: {} of {} \
+         along track, {} of {} across.",
         label(BAARDA_LIMIT, 2),
         whole(beyond(&along)),
         whole(along.len()),
@@ -117,7 +118,7 @@ pub(super) fn distribution(adjusted: &Adjusted) -> Result<Markup> {
             high: SHOWN,
         },
         ..Plot::of(
-            "Distribution of tie point residuals".to_owned(),
+            "Distribution of tie-point residuals".to_owned(),
             words,
             "standardised residual",
             vec![panel],

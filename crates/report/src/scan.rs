@@ -24,8 +24,9 @@ pub(super) const SECTION: Section = Section {
 
 fn write(site: &SiteProducts) -> Result<Markup> {
     let words = paragraph(
-        "The best time-tag correction minimises the spread of the residuals, with the radii (raw or crossover-corrected) that \
-         give the smaller spread. Nadir profiles constrain the correction poorly.",
+        "The best time-tag correction minimises the spread of the residuals, with raw radii, or with \
+         crossover-corrected radii if these reduce the least spread by more than 2 %. Nadir profiles constrain the \
+         correction poorly.",
     );
     let plots = plotted(site).into_iter();
     let plots = plots.filter_map(|index| scan_plot(site, index));
@@ -53,7 +54,7 @@ fn table(site: &SiteProducts) -> Markup {
             Column::Number("uncertainty"),
             Column::Number("configured"),
             Column::Number("best − configured"),
-            Column::Number("spread at the nearest scanned correction, m"),
+            Column::Number("least spread at a scanned correction, m"),
         ],
     );
     for (index, ranges) in site.ranges.profiles.iter().enumerate() {
@@ -104,7 +105,7 @@ fn scan_plot(site: &SiteProducts, index: usize) -> Option<Plot> {
         colour: MARK,
     });
     let caption = format!(
-        "{} (blue); configured: {} s (red).",
+        "{}; configured: {} s (red).",
         best(scan),
         signed(configured_s, 3)
     );
@@ -117,7 +118,7 @@ fn best(scan: &BiasScan) -> String {
     match (scan.best_s, scan.uncertainty_s) {
         (Some(best_s), Some(uncertainty_s)) => {
             format!(
-                "Best {} ± {} s",
+                "Best {} ± {} s (blue)",
                 signed(best_s, 4),
                 number(uncertainty_s, 4)
             )

@@ -150,7 +150,7 @@ fn table(sites: &[SiteLine]) -> Markup {
             Column::Number("height offset, m: before → adjusted"),
             Column::Number("image distance, m: before → adjusted"),
             Column::Number("range − distance, m"),
-            Column::Text("against the run before"),
+            Column::Text("compared with the previous run"),
             Column::Text("published (UTC)"),
         ],
     );

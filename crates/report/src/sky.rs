@@ -112,7 +112,7 @@ fn words(site: &SiteProducts, unnamed: &[&str]) -> String {
     let pairs = BeforeAfter::all(geometric);
     for pair in pairs.iter().take(PAIRS_LISTED) {
         words += &format!(
-            " {}: convergence {}°, base-to-height {}, {} in common.",
+            " {}: convergence {}°, base-to-height ratio {}, {} in common.",
             pair.name(),
             label(pair.before.convergence_rad / RADIANS_PER_DEGREE, 1),
             label(pair.before.height_over_base.recip(), 2),

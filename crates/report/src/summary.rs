@@ -189,10 +189,11 @@ fn by_altimeter(site: &SiteProducts) -> Option<KeyNumber> {
         // Data that control a result cannot test it: then only the number before does.
         note: match site.config.adjustment.model {
             AdjustmentModel::MolaSurface => html! {
-                "median of " (ties) ", controlled by " (altimeter) "; " (before_m) " m of " (all) " before, independent of it"
+                "median of " (ties) ", controlled by " (altimeter) "; before the adjustment "
+                (before_m) " m, median of " (all) ", independent of it"
             },
             AdjustmentModel::Published => html! {
-                "median of " (ties) "; " (before_m) " m of " (all) " before the adjustment"
+                "median of " (ties) "; before the adjustment " (before_m) " m, median of " (all)
             },
         },
     })
@@ -269,7 +270,7 @@ fn in_place(site: &SiteProducts) -> Option<KeyNumber> {
         ),
         note: html! {
             @if is_open(&geometric, &adjustment) {
-                "from " (by) "; see accuracy for open points"
+                "from " (by) "; open points: see Accuracy"
             } @else {
                 "position from " (by) ", height from " (site.config.terms().altimeter)
             }

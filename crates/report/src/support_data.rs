@@ -43,7 +43,7 @@ fn write(site: &SiteProducts) -> Markup {
     if !apart.is_empty() {
         words += &format!(
             " Positions from ALE usually include light time and aberration, which amount to hundreds of metres: \
-             neither ranges nor the laser mounting are used with {}.",
+             neither ranges nor the laser mounting is used for {}.",
             named(&apart)
         );
     }

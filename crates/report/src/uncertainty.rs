@@ -55,7 +55,7 @@ const COLUMNS: &[Column] = &[
 const WORDS: &str = "As in Shan et al. 2005: D = √(M² + σ²) of the reprojection residuals. Across the track, the paper averages \
                      where its eq. 7 adds squares; both results are stated. Known flaw: eq. 7 adds the means of both images \
                      in quadrature, although means of opposite sign add up in eq. 5; eq. 6 assigns the remainder to the \
-                     footprints. Error-free shots also leave a remainder; it is not the accuracy of the altimeter.";
+                     footprints. This remainder is not the accuracy of the altimeter: error-free shots also leave one.";
 
 /// Title of the budget by eq. 5.
 const SIGNED_TITLE: &str = "The same with Δ = Δ1 − Δ2 of every tie point (eq. 5)";
@@ -70,7 +70,8 @@ const SIGNED_COLUMNS: &[Column] = &[
 ];
 const SIGNED_WORDS: &str = "Means keep their signs. Not by orientation: mean misregistration of the footprints that the mean of the \
                             tie points does not explain; for several pairs, the root mean square. A planimetric footprint error \
-                            moves both projections alike and is not visible here. Agreement of two images, not accuracy.";
+                            moves both projections alike and is not visible here. The table states the agreement of \
+                            two images, not accuracy.";
 
 /// A row for each state of each of these pairs with a budget, and one of the budgets of all pairs before the adjustment.
 fn rows<const N: usize>(

@@ -371,7 +371,8 @@ pub(super) fn context_site(images: &[ContextImage<'_>]) -> SiteFile<'static> {
         pedr,
         ties: Some(SiteTies {
             file: format!("../ties/{}", ties_name(CONTEXT_SITE.id)),
-            note: "The noise of these tie points is a fifth of a pixel.".to_owned(),
+            note: "The noise of these tie points has a standard deviation of 0.2 pixels."
+                .to_owned(),
             sigma_px: [NOISE_PX; 2],
         }),
         windows: vec![window(&CONTEXT_SITE, WINDOW_HALF_DEG)],

@@ -34,7 +34,8 @@ pub enum SceneError {
     Other,
     /// No orbit shows the site as planned.
     #[error(
-        "no orbit found that shows {image} as planned: last step {step} rad after {iterations} iterations, expected below 1e-13 rad"
+        "no orbit found from which {image} shows the planned ground: last step {step} rad after {iterations} \
+         iterations; expected below 1e-13 rad"
     )]
     #[cause(Bug: "report this with the seed and the kernels that were used")]
     NoOrbit {
@@ -46,7 +47,9 @@ pub enum SceneError {
         iterations: u32,
     },
     /// The true orientation of an image is invalid.
-    #[error("the true orientation of image {image} does not show its tie points: {error}")]
+    #[error(
+        "image {image} does not show its tie points according to its true orientation: {error}"
+    )]
     #[cause(like = NoOrbit)]
     NoCamera {
         /// Image id.
@@ -92,8 +95,9 @@ pub enum SceneError {
         most: f64,
     },
     /// The kernels do not cover a single stretch of 20 s.
-    #[error("the kernels have no interval of {least_s} s or more with both orbit and attitude")]
-    #[cause(Coverage: "check that the metakernel loads SPK for -94 and 499 and CK for -94000 for the same time")]
+    #[error("the kernels contain no interval of {least_s} s or more with both orbit and attitude")]
+    #[cause(Coverage: "check that the metakernel loads SPKs of -94 and 499 and a CK of -94000 that cover the same \
+     time")]
     NothingToFly {
         /// Shortest stretch of flight, seconds.
         least_s: f64,

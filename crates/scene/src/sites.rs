@@ -192,7 +192,8 @@ pub(super) fn planned_site<'a>(
 ) -> SiteFile<'a> {
     let is_demo = *errors == SceneErrors::demo();
     let ties_of_demo = || {
-        let note = "The noise of these tie points is one line, 1.1 to 1.6 focal-plane pixels.";
+        let note = "The noise of these tie points has a standard deviation of one line, which is 1.1 to 1.6 \
+         focal-plane pixels.";
         (note.to_owned(), [1.6, 1.0])
     };
     let ties_with_noise = |noise_px: f64| {
@@ -201,8 +202,8 @@ pub(super) fn planned_site<'a>(
             .each_ref()
             .map(|camera| camera.focal_px_per_line);
         let note = format!(
-            "The noise of these tie points is {noise_px} lines and samples; their lines are {first:.2} and {second:.2} \
-             focal-plane pixels."
+            "The noise of these tie points has a standard deviation of {noise_px} lines and samples; a line is \
+             {first:.2} and {second:.2} focal-plane pixels in the two images."
         );
         let along_px = 0.5 * (first + second) * noise_px;
         (note, [(1_000.0 * along_px).round() / 1_000.0, noise_px])

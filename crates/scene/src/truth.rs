@@ -285,9 +285,9 @@ impl Truth {
             made_by: "areograph scene",
             synthetic: "all values are invented, except that ids, times, summing, lines, line periods and emission angles of \
                 the narrow-angle images follow Shan et al. 2005",
-            table_2: "Emission angles are from Shan et al. 2005, Table 2, measured at the ground. For E04-01275, the table \
-                reports 7424 header lines, for which the first-order RMSE in their Table 4 would be 9.7 m instead of the \
-                published 11.45 m. Here the image has 8064 lines, of which 7424 are delivered.",
+            table_2: "Emission angles are from Shan et al. 2005, Table 2, measured at the ground. For E04-01275, the \
+                table reports 7424 header lines, for which the first-order RMSE in Table 4 would be 9.7 m instead of \
+                the published 11.45 m. Here the image has 8064 lines, of which 7424 are delivered.",
             orbit: "image positions belong to the orbit gsfc (kernels/gsfc.tm), which is true except for errors_drawn; nav \
                 (used by the site files) and ipng differ from gsfc by orbit_differences",
             seed,
@@ -315,19 +315,20 @@ impl Truth {
                 rule: "in the files, ground and spacecraft are too high by the residual, amplitude_m sin(2 pi et / period_s) at \
                 the mid-point of the frame; radii are the values before its subtraction",
             },
-            frame_model: "Latitude and longitude vary linearly within a PEDR frame. Near the poles, during slews and on steep ground \
-                off nadir, a frame cannot represent 20 true footprints to 0.2 m; it does not include jitter. The numbers of \
-                affected shots are under files, the largest errors under profiles.",
+            frame_model: "Latitude and longitude vary linearly within a PEDR frame. Near the poles, during slews and \
+                on steep ground off nadir, a frame cannot represent 20 true footprints to 0.2 m; frames do not include \
+                jitter. The numbers of affected shots are under files, the largest errors under profiles.",
             images: Vec::new(),
             files: Vec::new(),
             profiles: Vec::new(),
-            tie_rule: "Line n of an image was exposed at the time that its label gives for line n + time_bias_lines, from the \
-                position of the orbit gsfc at that time plus position_bias_m (IAU 2000), with the true attitude of that time \
-                (errors_rule). Line, position and quaternion of a camera describe its true poses. The camera records light \
-                that left the ground light_time_s before the exposure, with the positions of camera and Mars at that instant \
-                and the attitude of the exposure (light time and aberration). Tie points are measured in such images, at \
-                ground_iau2000_m. The position bias relative to nav is position_bias_m minus the orbit difference of nav. \
-                Lines and samples of measurements have noise (tie_noise_px under errors), plus blunders.",
+            tie_rule: "Line n of an image was exposed at the time that its label gives for line n + time_bias_lines, \
+                from the position of the orbit gsfc at that time plus position_bias_m (IAU 2000), with the true \
+                attitude of that time (errors_rule). Line, position and quaternion of a camera describe its true \
+                poses. The camera records light that left the ground light_time_s before the exposure, with the \
+                positions of camera and Mars at that instant and the attitude of the exposure (light time and \
+                aberration). Tie points are measured in such images, at ground_iau2000_m. The position bias relative \
+                to nav is position_bias_m minus the orbit difference of nav. Lines and samples of measurements contain \
+                noise (tie_noise_px under errors) and blunders.",
             ties: Vec::new(),
             wide_angle_rule: "Wide-angle images are exposed at the times of their labels, from the true position of the bus \
                  with its true attitude. The light time of each point is applied. Lines and samples of shots follow the \

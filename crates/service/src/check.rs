@@ -68,7 +68,9 @@ pub fn check(config: &ServiceConfig, now_ms: i64) -> Vec<Finding> {
         });
     };
     let next = next_night_ms(&config.schedule, now_ms).map(minute_text);
-    let next = next.map_or_else(String::new, |next| format!("the next night is {next}"));
+    let next = next.map_or_else(String::new, |next| {
+        format!("the next night begins at {next}")
+    });
     note("schedule", &config.schedule.cron, true, Ok(next));
     let (state, products) = (&config.outputs.state, &config.outputs.products);
     note("state", &state.display(), true, state_folder(state));

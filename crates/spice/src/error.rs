@@ -123,13 +123,13 @@ pub enum SpiceError {
     },
     /// Kernels hold the spacecraft, but not the Sun as Mars sees it.
     #[error(
-        "no position of the Sun as seen from Mars at {seen} (UTC {utc}); expected kernels with Mars at this time and \
-         with the Sun {:.0} to {:.0} s earlier, when the light left the Sun",
+        "no position of the Sun as seen from Mars at {seen} (UTC {utc}); expected kernels that contain Mars at this \
+         time, and the Sun {:.0} to {:.0} s earlier, when the light left the Sun",
         SUN_LIGHT_S[0], SUN_LIGHT_S[1]
     )]
     #[cause(
-        Coverage: "add an ephemeris of the Sun and Mars that begins 14 minutes before the image, for example a planetary \
-                   ephemeris (de*.bsp)"
+        Coverage: "add an ephemeris of the Sun and Mars that begins at least 14 minutes before the image, for example \
+         a planetary ephemeris (de*.bsp)"
     )]
     NoSun {
         /// Instant at which its light arrives at Mars.
@@ -150,7 +150,9 @@ pub enum SpiceError {
     },
     /// A kernel holds NaN or an infinity.
     #[error("{what} at {instant} (UTC {utc}) is not finite{part}")]
-    #[cause("fetch the kernel again, or omit it from the list: this part contains NaN or infinity")]
+    #[cause(
+        "fetch the kernel again, or omit it from the list: this interval contains NaN or infinity"
+    )]
     NotFinite {
         /// The position, velocity or attitude concerned.
         what: String,
@@ -180,7 +182,8 @@ pub enum SpiceError {
         "trajectory near {near}: positions and velocities in the kernels disagree by {error_m:.3} m within {piece_s} s; \
          expected at most {tolerance_m} m"
     )]
-    #[cause(Coverage: "check the SPK for jumps at this time, and for positions in kilometres and velocities in km/s")]
+    #[cause(Coverage: "check the SPK for jumps at this time, and check that its positions are in kilometres and its \
+     velocities in km/s")]
     NoConvergence {
         /// The instant.
         near: Et,

@@ -146,7 +146,7 @@ impl KernelSet {
         if let Some(index) = self.kernels.iter().position(same) {
             let earlier = self.kernels.remove(index).file_name();
             self.explanation.push(format!(
-                "{earlier}: not loaded at its earlier position, same content as {name}"
+                "{earlier}: not loaded at its earlier position because it has the same content as {name}"
             ));
         }
         self.kernels.push(kernel);

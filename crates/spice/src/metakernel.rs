@@ -123,7 +123,7 @@ fn listed_names(assignments: &[Assignment]) -> std::result::Result<Vec<String>, 
     if symbols.len() != values.len() {
         return Err(SpiceError::NotAKernel {
             found: format!(
-                "a metakernel of {} PATH_SYMBOLS and {} PATH_VALUES",
+                "a metakernel with {} PATH_SYMBOLS and {} PATH_VALUES",
                 symbols.len(),
                 values.len()
             ),

@@ -137,7 +137,7 @@ impl Found {
                 }
                 KernelRole::Ck => found.attitudes.push(path),
                 KernelRole::Meta => {
-                    let note = format!("{}: not used, a metakernel", file_name(&path));
+                    let note = format!("{}: not used because it is a metakernel", file_name(&path));
                     found.notes.push(note);
                 }
                 _ => match read_text(&path).and_then(|text| Ok(text_kernel::assignments(&text)?)) {
@@ -178,7 +178,8 @@ fn files_below(root: &Path) -> Result<Vec<PathBuf>> {
                 files.push(entry.path());
             }
             if files.len() > FILES_MAX {
-                let what = format!("can be selected from more than {FILES_MAX} files");
+                let what =
+                    format!("can be selected: the folder contains more than {FILES_MAX} files");
                 return Err(SpiceError::NothingToSelect { what }).in_file(root);
             }
         }
@@ -292,7 +293,8 @@ fn select_ephemerides(
         let own = holds_spacecraft(segments);
         let name = file_name(path);
         if !fits(path, segments) {
-            let line = format!("{name}: not used, not from the orbit solution {family}");
+            let line =
+                format!("{name}: not used because it is not from the orbit solution {family}");
             set.set.explanation.push(line);
         } else if touches(segments) {
             let reason = if own {
@@ -307,7 +309,7 @@ fn select_ephemerides(
                 "position of the Sun when the light that reaches Mars left it",
             )?;
         } else {
-            let line = format!("{name}: not used, contains none of the required times");
+            let line = format!("{name}: not used because it covers none of the required times");
             set.set.explanation.push(line);
         }
     }
@@ -368,8 +370,9 @@ fn select_attitudes(
             let hull = hull.map(|(first, last)| interval_of([first[0], last[1]]));
             let hull = Intervals::union_of(hull);
             if hull.intersection(required).as_slice().is_empty() {
-                let line =
-                    format!("{name}: not used, contains no attitude near the required times");
+                let line = format!(
+                    "{name}: not used because it contains no attitude near the required times"
+                );
                 set.set.explanation.push(line);
                 continue;
             }

@@ -310,7 +310,7 @@ impl Session {
             what,
             instant,
             utc: utc.unwrap_or_else(|_| "unknown".to_owned()),
-            part: part.map_or_else(String::new, |part| format!(", in its part of {part}")),
+            part: part.map_or_else(String::new, |part| format!(", in the interval {part}")),
         });
         match origin {
             Some(origin) => failure.in_file(origin.path),

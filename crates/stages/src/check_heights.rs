@@ -64,7 +64,7 @@ pub struct SurfaceFigures {
     pub profiles: usize,
     /// Root mean square difference of heights 300 m apart, metres.
     pub roughness_m: f64,
-    /// Root mean square slope along each axis at the tie points, metres per metre.
+    /// Root mean square slope, per axis, at the tie points, metres per metre.
     pub slope: f64,
 }
 
@@ -100,7 +100,7 @@ pub struct ProfilesApart {
     pub profiles: [String; 2],
     /// Mean height of the first surface above the second, metres.
     pub mean_m: f64,
-    /// Standard deviation of this mean height, metres.
+    /// Standard deviation of `mean_m`, metres.
     pub sigma_m: f64,
     /// Number of pairs of profiles that were compared.
     pub pairs: usize,

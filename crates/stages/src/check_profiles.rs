@@ -39,7 +39,7 @@ pub struct ProfileCheck {
     pub crossovers: Vec<ProfileCrossover>,
     /// Differences at the crossovers of profiles that belong, metres.
     pub differences_m: Summary,
-    /// Standard deviation of the radial error that the shots of a profile share, from crossovers and a priori, metres.
+    /// Standard deviation of the radial error that the shots of a profile share, from crossovers and the a priori value, metres.
     pub profile_sigma_m: f64,
     /// Shifts of profiles with crossovers.
     pub shifts: Vec<ShiftedProfile>,
@@ -73,7 +73,7 @@ pub struct ShiftedProfile {
     pub crossovers: usize,
     /// Offset of the recorded from the true position of the profile in east, north and height, metres.
     pub shift_m: [f64; 3],
-    /// Covariance of this offset, m².
+    /// Covariance of the offset, m².
     pub covariance_m2: [[f64; 3]; 3],
 }
 
@@ -88,12 +88,13 @@ pub struct LeftOutProfile {
     pub others: Vec<String>,
     /// Height of the profile above the others, metres.
     pub above_m: f64,
-    /// Standard deviation of this height, metres.
+    /// Standard deviation of `above_m`, metres.
     pub sigma_m: f64,
-    /// Robust root mean square of the height differences at its crossovers, each divided by its standard deviation, which includes
-    /// shifts of both profiles; 1 is expected.
+    /// Robust root mean square of the height differences at its crossovers, each divided by its standard deviation,
+    /// which includes the uncertainty of the shifts of both profiles; 1 is expected.
     pub misfit: f64,
-    /// Whether the profile is misplaced horizontally; false where its mean height differs by more than five standard deviations.
+    /// Whether the profile is misplaced horizontally; false if its mean height differs from that of the others by more
+    /// than five standard deviations.
     pub misplaced: bool,
 }
 
@@ -142,7 +143,7 @@ pub struct WithheldStretch {
     pub shots: usize,
     /// Mean of measured minus predicted heights, metres.
     pub above_m: f64,
-    /// Standard deviation of this mean according to the surface, metres.
+    /// Standard deviation of `above_m` according to the surface, metres.
     pub sigma_m: f64,
     /// Distance to the nearest shot of another profile, metres.
     pub nearest_shot_m: f64,

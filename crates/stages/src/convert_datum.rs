@@ -307,11 +307,11 @@ pub fn convert_at_tags(
 fn note(body: Body, name: &str, datum: Datum, turn_s: Option<f64>) -> String {
     let frame = &body.names().short_frame;
     match turn_s {
-        None if datum == body.datum() => format!("{name}: in {frame} already, not converted"),
+        None if datum == body.datum() => format!("{name}: already in {frame}, not converted"),
         None => format!("{name}: converted from {datum} to {frame} at each shot's time tag"),
         Some(turn_s) => {
             format!(
-                "{name}: converted from {datum} at the time tag, to {frame} {turn_s:+.3} s later"
+                "{name}: converted from {datum} at the time tag to {frame} at the time tag {turn_s:+.3} s"
             )
         }
     }
@@ -394,7 +394,7 @@ mod tests {
         assert_eq!(after.footprints, before.declare());
         assert_eq!(
             after.notes,
-            ["ap18933k.b: in IAU 2000 already, not converted"]
+            ["ap18933k.b: already in IAU 2000, not converted"]
         );
     }
 

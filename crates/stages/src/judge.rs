@@ -158,12 +158,12 @@ impl Evidence<'_> {
             .map(|(reason, count)| format!("{count} ({reason})"));
         let counts: Vec<String> = counts.collect();
         let check = if self.rejected.contains_key(&ShotRejection::Spoiled) {
-            "radii, ranges and positions of spoiled shots contradict each other: check their units and reference sphere"
+            "radii, ranges and positions of these shots contradict each other: check their units and reference sphere"
         } else {
             "check pedr.filter"
         };
         format!(
-            "no footprint in any window: all shots in the windows are rejected, {}; {check}",
+            "no footprint in any window, because all shots in the windows were rejected: {}; {check}",
             counts.join(", ")
         )
     }

@@ -327,9 +327,10 @@ impl Gathered<'_> {
         )];
         if self.layouts.contains(&true) {
             notes.push(
-                "Tables of the Orbital Data Explorer: planet_rad, corrected by crossovers, serves as both radii, and \
-                 topography is taken from the table; the spacecraft position is assumed on the radius through the \
-                 footprint, at the measured range (nadir by range), because the tables do not state its position"
+                "Tables of the Orbital Data Explorer: planet_rad, which is corrected by crossovers, serves as the \
+                 radius before and after this correction, and topography is taken from the table; the spacecraft is \
+                 assumed to be on the radius through the footprint, at the measured range (nadir by range), because \
+                 the tables do not state its position"
                     .to_owned(),
             );
             if !self.layouts.contains(&false) {

@@ -373,7 +373,7 @@ mod tests {
         assert_eq!(
             again.remarks,
             [
-                "3 duplicate the measurements of another point and are omitted, for example 1 those of 1"
+                "3 duplicate the measurements of another point and are omitted, for example 1, a duplicate of 1"
             ]
         );
         // One place of A, two of B.

@@ -49,8 +49,8 @@ pub struct LineCorrection {
 #[cause(Bug: "report this with the site's configuration and the log")]
 enum ReorientError {
     #[error(
-        "image {image}: a shift by {shift_lines:.3} lines requires the orientation over {required}; expected within \
-         the camera tables, {known}"
+        "image {image}: a shift by {shift_lines:.3} lines requires the orientation over {required}; expected times \
+         within the camera tables, {known}"
     )]
     #[cause(Input: "check the image's start time, or give its time bias a smaller standard deviation")]
     Shift {

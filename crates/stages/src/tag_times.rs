@@ -89,7 +89,7 @@ pub enum StartFrom {
     Support,
     /// Ephemeris time of the configuration.
     Exposures,
-    /// Ephemeris time that the file states beside every line.
+    /// Ephemeris time that the file states for every line.
     Lines,
 }
 

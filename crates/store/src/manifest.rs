@@ -83,9 +83,9 @@ pub mod figures {
     /// A posteriori standard deviation of unit weight of the adjustment.
     pub const ADJUSTMENT_SIGMA0: &str = "adjustment_sigma0";
 
-    /// Root mean square deviation of tie-point images in a net of pictures, larger of both coordinates, metres.
+    /// Root mean square deviation of tie-point images in a net of pictures, the larger of the two coordinates, metres.
     pub const TIE_DEVIATION_RMS_M: &str = "tie_deviation_rms_m";
-    /// Root mean square residual of the kept controls of a net, larger of both coordinates, metres.
+    /// Root mean square residual of the kept controls of a net, the larger of the two coordinates, metres.
     pub const CONTROL_RESIDUAL_RMS_M: &str = "control_residual_rms_m";
 
     /// Largest root mean square residual of tie points among the lines and axes of a calibrated camera, pixels.
@@ -136,11 +136,12 @@ pub mod figures {
         ),
         (
             TIE_DEVIATION_RMS_M,
-            "Root mean square deviation of tie-point images in a net of pictures, larger of both coordinates, metres.",
+            "Root mean square deviation of tie-point images in a net of pictures, the larger of the two coordinates, \
+             metres.",
         ),
         (
             CONTROL_RESIDUAL_RMS_M,
-            "Root mean square residual of the kept controls of a net, larger of both coordinates, metres.",
+            "Root mean square residual of the kept controls of a net, the larger of the two coordinates, metres.",
         ),
         (
             TIE_RESIDUAL_RMS_PX,
@@ -212,7 +213,7 @@ pub struct KernelChoiceEntry {
     pub set: String,
     /// Whether the set was used: its trajectory has the smallest root mean square distance from the mean of all sets.
     pub chosen: bool,
-    /// Instants at which all sets were compared.
+    /// Number of instants at which all sets were compared.
     #[schemars(range(min = 1))]
     pub epochs: u64,
     /// Root mean square distance from the mean of all sets, metres.

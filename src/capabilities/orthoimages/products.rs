@@ -23,7 +23,7 @@ const SITES: &str = "a site with orthoimages";
 pub(super) static ORTHOIMAGE: Declaration = Declaration {
     path: "images/<image>/orthoimage.tif",
     what: "orthoimage on the equirectangular map of surface.tif (cloud-optimised GeoTIFF): brightness 1 to 255 (pixel value 0 is \
-           stored as 1), or 0 in cells without a height, hidden by relief, or with missing pixels",
+           stored as 1), or 0 in cells that have no height, are hidden by relief or lack pixels",
     readers: "GIS",
     rows: "cells with a brightness",
     role: Role::Data,

@@ -36,8 +36,8 @@ fn write(site: &SiteProducts) -> Result<Markup> {
         (table(site, orthoimages))
         p {
             "Cells are empty in wide holes of the terrain model, on ground that relief hides from the camera, and where \
-             pixels are missing. Heights in narrow holes are interpolated; off nadir their σ is larger. σ is the standard \
-             deviation of the horizontal position of a cell, both axes together, without the shared error. It contains \
+             pixels are missing. σ is the standard deviation of the horizontal position of a cell, both axes together, \
+             without the shared error. Heights in narrow holes are interpolated, which increases σ off nadir. σ contains \
              height errors, jitter (where the scatter of tie points shows it), and drift (orientation errors that change \
              along the image). The adjustment states the σ of the shared error on each axis. Images without tie points are \
              not rectified in an adjusted site."

@@ -44,11 +44,11 @@ const DEFINITIONS: [(&str, &str); 7] = [
     (
         "mola_minus_surface",
         "radius of a footprint minus the model radius at its position, interpolated between the four nearest cells, metres; \
-         all: profiles at nadir, because attitude errors change the heights of other profiles, or all profiles if fewer than \
-         10 shots at nadir lie on the model; attitude_sigma_m: standard deviation of this change (0 at nadir), for all \
-         profiles the largest; \
-         spread_sigmas: robust spread of the difference about its median, in units of its standard deviation, which contains \
-         height, shot, profile, and slope times position uncertainty",
+         all: profiles at nadir, because attitude errors change the heights of other profiles; if fewer than 10 shots at \
+         nadir lie on the model, all profiles; attitude_sigma_m: standard deviation of the change due to attitude errors \
+         (0 at nadir), in the statistics of all shots the largest; spread_sigmas: NMAD of the differences from their median \
+         (with profiles off nadir, from the median of each profile), each divided by its standard deviation, which contains \
+         the uncertainties of height, shot, profile, and position on slopes",
     ),
     (
         "mola_takes_part",
@@ -61,7 +61,7 @@ const DEFINITIONS: [(&str, &str); 7] = [
 #[schemars(
     title = "Terrain model of a site",
     description = "surface.json of areograph: derivation of surface.tif from a pair of images, statistics of its cells, and \
-         differences between altimeter and model. Metres and degrees; unknown values are omitted."
+         differences between footprints and model. Metres and degrees; unknown values are omitted."
 )]
 pub(super) struct Document<'a> {
     #[schemars(extend("const" = "areograph surface 1"))]
@@ -99,7 +99,8 @@ struct Matching {
     height_of_pixel_m: f64,
     /// Median correlation.
     correlation: f64,
-    /// Median distance between the images on the ground, across the parallax: the residual of their orientations.
+    /// Median distance between the images on the ground, perpendicular to the parallax: the residual error of their
+    /// orientations.
     across_parallax_m: f64,
 }
 

@@ -113,7 +113,7 @@ fn invalid_because(
     // Written so that NaN counts, here and below.
     if !(surface.filled_share() >= limits.surface_filled_min) {
         reasons.push(format!(
-            "terrain model: {filled} of {} cells that both images show have a height, expected at least {:.0} %",
+            "terrain model: {filled} of {} cells that both images show have a height; expected at least {:.0} %",
             surface.cells,
             100.0 * limits.surface_filled_min
         ));
@@ -125,7 +125,7 @@ fn invalid_because(
     let height_max_m = height_max_m(limits, surface);
     if !(shots.above_m.median.abs() <= height_max_m) {
         reasons.push(format!(
-            "terrain model: {altimeter} lies {} m above the model (median of {} shots); expected at most {height_max_m:.1} m",
+            "terrain model: {altimeter} minus model is {} m (median of {} shots); expected within ±{height_max_m:.1} m",
             signed(shots.above_m.median, 1),
             shots.above_m.n
         ));
@@ -133,7 +133,8 @@ fn invalid_because(
     let spread_max = limits.surface_spread_max_sigma;
     if !(shots.spread_sigmas <= spread_max) {
         reasons.push(format!(
-            "terrain model: shots of {altimeter} scatter about the model by {:.1} standard deviations; expected at most {spread_max:.1}",
+            "terrain model: shots of {altimeter} scatter about the model by {:.1} standard deviations (NMAD); expected at \
+             most {spread_max:.1}",
             shots.spread_sigmas
         ));
     }
@@ -154,8 +155,8 @@ fn remark(surface: &SurfaceAccount, altimeter: &str) -> Option<String> {
     }
     (shots.attitude_sigma_m > 0.0).then(|| {
         format!(
-            "terrain model: fewer than {SHOTS_MIN} shots at nadir lie on the model; the other profiles test its heights to \
-             ±{:.0} m, because attitude errors shift them",
+            "terrain model: fewer than {SHOTS_MIN} shots at nadir lie on the model; the other profiles test its heights only \
+             to ±{:.0} m, because attitude errors shift these profiles",
             shots.attitude_sigma_m
         )
     })

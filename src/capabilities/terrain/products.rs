@@ -36,8 +36,9 @@ pub(super) static HEIGHTS: Declaration = Declaration {
 
 pub(super) static SIGMAS: Declaration = Declaration {
     path: "surface_sigma.tif",
-    what: "standard deviations of the heights in surface.tif about their common offset, metres, in the same cells: due to match, \
-           jitter and relief inside the compared square; surface.json states the standard deviation of the offset",
+    what: "standard deviations of the heights in surface.tif about their common offset, metres, in the same cells: \
+           due to matching, jitter and relief inside the compared square; surface.json states the standard deviation \
+           of the offset",
     readers: "GIS, Ames Stereo Pipeline",
     rows: "cells with a height",
     role: Role::Data,

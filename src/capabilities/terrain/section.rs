@@ -169,7 +169,7 @@ fn compared(account: &SurfaceAccount, altimeter: &str) -> Markup {
         format!("{altimeter} did not control the heights: the comparison is an independent test.")
     };
     let spread = format!(
-        "Expected spread about the median: {} m (σ of height, shot, profile, and position on slopes); ratio found: {}.",
+        "Expected spread about the median: {} m (σ of height, shot, profile, and position on slopes); found: {} times the expected (NMAD).",
         label(*sigma_m, 1),
         label(*spread_sigmas, 2)
     );

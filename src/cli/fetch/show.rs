@@ -78,7 +78,7 @@ pub(super) fn outcome(outcome: &Outcome) {
         Ok((Done::Present, _)) => tracing::info!("{path}: present"),
         Ok((Done::Adopted, record)) => {
             output::line(format_args!(
-                "{path}: was present, and matches the file of the archive, {}",
+                "{path}: was present and matches the file of the archive, {}",
                 size(record.bytes)
             ));
         }

@@ -32,9 +32,9 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// 16 bits: relative radiance from gain, offset and exposure, with the offset between odd and even detectors
-    /// removed (narrow angle without summing). The values are not suited to geometric work, and are not
-    /// reflectances, whose constants are not public. The command refuses images whose gain changes from line to
-    /// line.
+    /// removed (narrow angle without summing). The values are not suited to geometric work. They are not
+    /// reflectances, because the constants of that calibration are not public. The command refuses images whose
+    /// gain changes from line to line.
     #[arg(long)]
     calibrate: bool,
     /// Also write a mask of good (255), suspect (128) and missing (0) lines, in one of the same formats.
@@ -51,7 +51,7 @@ struct Ending(PathBuf);
 /// An image without a readable line.
 #[derive(Debug, thiserror::Error, Cause)]
 #[error("no line of the image can be read")]
-#[cause(Input: "fetch the file again; `areograph image info` lists its errors")]
+#[cause(Input: "fetch the file again; `areograph image info` lists the errors")]
 struct NoLines;
 
 /// A radiometric correction of a file whose label does not state gain and offset.
@@ -175,8 +175,8 @@ fn notes(image: &PixelFile, calibration: Option<&Calibration>) -> Vec<(&'static 
         notes.push((
             "Description",
             format!(
-                "radiance in DN/ms at gain 1{zero} = {:e} + {:e} * value; {:.3} DN added to odd samples and subtracted from \
-                 even samples",
+                "relative radiance in DN/ms at gain 1{zero} = {:e} + {:e} * value; {:.3} DN added to odd samples and \
+                 subtracted from even samples",
                 calibration.least, calibration.step, calibration.odd_even_dn
             ),
         ));

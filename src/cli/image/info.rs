@@ -22,14 +22,14 @@ use crate::{
 
 /// Shows label, size, coding, statistics, and all errors of each image file.
 ///
-/// Cubes and pictures may replace images of the archive. Values other than bytes are scaled, the smallest to 1 and
+/// Cubes, TIFF and PNG files may replace images of the archive. Values other than bytes are scaled, the smallest to 1 and
 /// the largest to 255, and statistics refer to the scaled values.
 ///
 /// Statistics and the hash refer to the decoded 8-bit pixels in the order of the file; missing lines are excluded. A
 /// line is suspect if it comes from damaged data, or if its place in the image is unknown. A damaged file is not a
 /// failure as long as part of it can be read. For an ISIS cube, `cube` states the part of the camera's image, the
 /// map projection, and whether its tables or the state of its camera model orient the image (`images.cube`), or why
-/// not. `exposures` are the line times in an HRSC file, in the form of `images.exposures`: first line, its start in
+/// they do not. `exposures` are the line times in an HRSC file, in the form of `images.exposures`: first line, its start in
 /// ET seconds, line period in milliseconds.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: areograph image info e0202855.imq --json")]

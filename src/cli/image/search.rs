@@ -68,7 +68,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
     let undecided = pairs.iter().filter(|pair| !pair.is_known_apart).count();
     if undecided > 0 {
         tracing::warn!(
-            "{undecided} pairs may be from one orbit: the index states neither orbits nor times of both images"
+            "{undecided} pairs may be from one orbit: the index does not state the orbits or the times of both images"
         );
     }
     let format = if arguments.json {

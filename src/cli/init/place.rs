@@ -29,13 +29,13 @@ const PIXEL_MAX_M: f64 = 15.0;
 /// A site from a place.
 #[derive(Debug, Args)]
 pub(super) struct PlaceArguments {
-    /// A place of config/places, or with --box any name: proposes a window and images, and writes a site for `areograph fetch`.
+    /// A place of config/places, or with --box any name: proposes a window and images, and writes a site file for `areograph fetch`.
     #[arg(long, value_name = "NAME", conflicts_with_all = ["kernels", "pedr", "labels", "ties"])]
     place: Option<String>,
     /// Cumulative index of images (cumindex.tab). By default the copy of `areograph fetch --into DIR --index`.
     #[arg(long, value_name = "FILE", requires = "place")]
     index: Option<PathBuf>,
-    /// Pairs of images to propose.
+    /// Number of pairs of images to propose.
     #[arg(long, value_name = "COUNT", default_value_t = 1, requires = "place")]
     pairs: usize,
 }

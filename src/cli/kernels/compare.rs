@@ -23,10 +23,10 @@ use crate::{
 
 /// Compares rival kernel sets: how far the orbit and the attitude of each are from the mean of all.
 ///
-/// Orbits are positions of MGS from Mars (geometric, J2000) along the radial, along-track and cross-track axes of the
-/// mean orbit. The set with the least root mean square distance from the mean is closest, as in Shan et al. 2005.
-/// Epochs are equally spaced over the time that all sets cover, 1 s apart or, beyond 10000 epochs, far enough apart to
-/// keep that number; gaps of each set are listed.
+/// Orbits are positions of MGS relative to Mars (geometric, J2000) along the radial, along-track and cross-track axes of
+/// the mean orbit. The set with the least root mean square distance from the mean is closest, as in Shan et al. 2005.
+/// Epochs are equally spaced over the time that all sets cover, 1 s apart, or farther apart if there would be more than
+/// 10000; gaps of each set are listed.
 ///
 /// Example: `areograph kernels compare nav.tm gsfc.tm ipng.tm --site gusev_crater.toml`
 #[derive(Debug, Args)]
@@ -56,7 +56,7 @@ enum Usage {
     #[error("kernel sets to compare: {count}; expected two or more")]
     #[cause("name the metakernels of rival sets, or a site with [[kernels.sets]]")]
     TooFew { count: usize },
-    #[error("--time is \"{written}\"; expected FROM..TO in UTC, the first earlier than the second")]
+    #[error("--time is \"{written}\"; expected FROM..TO in UTC, FROM earlier than TO")]
     #[cause("write for example --time 1999-08-24T14:00..1999-08-24T15:00")]
     Time { written: String },
 }
@@ -184,7 +184,7 @@ fn print(compared: &Compared) {
     print_table(orbit, 1.0, None);
     if let Some(attitude) = &compared.attitude {
         output::line(format_args!(
-            "attitude: {} epochs; arcseconds about the same axes, ground in metres along the boresight",
+            "attitude: {} epochs; arcseconds about the same axes; ground: displacement of the boresight on the ground, metres",
             attitude.turns.epochs.len(),
         ));
         print_table(&attitude.turns, RADIANS_PER_ARCSECOND, Some(attitude));
@@ -234,7 +234,7 @@ fn print_table(comparison: &Comparison, unit: f64, attitude: Option<&AttitudeCom
     let tied: Vec<&str> = comparison.tied_sets().collect();
     if let [_, _] = &*comparison.deviations {
         output::line(
-            "  two sets are equally far from their mean: a third set is needed to choose one",
+            "  the two sets are equally far from their mean: a third set is needed to choose one",
         );
     } else if tied.is_empty() {
         output::line(format_args!("  closest to the mean of all: {closest}"));

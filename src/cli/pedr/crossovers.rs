@@ -25,8 +25,8 @@ use crate::{
 /// Finds the crossovers of the profiles of an archive in windows, and estimates the shift of each profile.
 ///
 /// The answer is JSON: every crossover with its position, the difference of the two heights and its standard deviation;
-/// for each profile its shift to the east, to the north and along the radius with covariance; and profiles that do not
-/// belong to the others. Profiles are named by window and orbit. Shifts are relative: a shift that all profiles share
+/// for each profile its shift to the east, to the north and along the radius with covariance; and profiles that are
+/// inconsistent with the others. Profiles are named by window and orbit. Shifts are relative: a shift that all profiles share
 /// is not determined.
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("where").required(true).multiple(true).args(["box", "polygons", "windows"]))]
@@ -50,7 +50,7 @@ const WINDOWS_MAX: usize = 64;
 /// The normal equations of more profiles would take more than a gigabyte.
 const PROFILES_MAX: usize = 2_000;
 
-/// Requests that are too large, or none.
+/// Requests without windows, or too large.
 #[derive(Debug, thiserror::Error, Cause)]
 #[cause(Configuration)]
 enum Request {

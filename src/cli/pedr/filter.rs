@@ -54,7 +54,7 @@ fn season(text: &str) -> Result<[f64; 2], String> {
         .ok_or_else(|| "expected two longitudes from 0 to 360 degrees, such as 330,30".to_owned())
 }
 
-/// The radius of a shot that is that of the ground.
+/// The radius of a shot that is used as the radius of the ground.
 #[derive(Debug, Args)]
 pub(super) struct GroundArgument {
     /// Radii: corrected by the crossover residuals of the files, or raw.

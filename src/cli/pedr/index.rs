@@ -53,7 +53,7 @@ struct Altered {
     is: String,
 }
 
-/// The index could not be put into bytes.
+/// The index could not be encoded.
 #[derive(Debug, thiserror::Error, Cause)]
 #[error("the index cannot be encoded")]
 #[cause(Bug: "this is a bug in areograph; please report it")]

@@ -29,8 +29,8 @@ use crate::{
 /// Shows label, orbits, time span, statistics of the shots, and all errors of each file.
 ///
 /// Shots are counted by class, trigger channel, attitude flag and orbit model, excluding shots without a return and
-/// contradictory shots. Ranges are compared with the distance from the spacecraft position in the file to the footprint:
-/// both come from one orbit, so that their difference tests the file and its reader without kernels.
+/// contradictory shots. Ranges are compared with the distance from the spacecraft position in the file to the footprint,
+/// which was computed with this position, so that the difference tests the file and its reader without kernels.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: areograph pedr info pedr/*.b")]
 pub(super) struct Arguments {

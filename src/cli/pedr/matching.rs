@@ -51,17 +51,17 @@ pub(super) struct Arguments {
     /// Height variance that a segment must exceed, square metres.
     #[arg(long, value_name = "M2", default_value_t = 1_000.0, value_parser = above_zero)]
     least_variance: f64,
-    /// Similarity of heights; auto uses pearson while the model is offset by more than a tenth of the relief, or 100
-    /// m, else ccc.
+    /// Similarity of heights; auto uses pearson if the model is offset by more than a tenth of the relief or more than
+    /// 100 m, else ccc.
     #[arg(long, value_enum, default_value_t = Measure::Auto)]
     similarity: Measure,
     /// Search radius of the shifts in each direction, cells.
     #[arg(long, value_name = "CELLS", default_value_t = 70, value_parser = clap::value_parser!(u16).range(1..=500))]
     search: u16,
-    /// Similarity that a unit must exceed, below 1.
+    /// Similarity, below 1, that a unit must exceed.
     #[arg(long, default_value_t = 0.9, value_parser = share)]
     least_score: f64,
-    /// Ratio of the best similarity to the mean of all similarities above 0; a unit must exceed it.
+    /// Ratio that a unit must exceed: best similarity over the mean of all positive similarities.
     #[arg(long, default_value_t = 1.0, value_parser = above_zero)]
     least_contrast: f64,
     /// Largest root mean square of model minus laser at all withheld shots, bias removed, metres.

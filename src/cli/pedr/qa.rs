@@ -20,7 +20,7 @@ use crate::{
 ///
 /// Products go to --out: a row of statistics for every profile, shots of the worst ones, a page. A profile is the part of one
 /// revolution in one file. A check that was interrupted or killed resumes where it stopped, with the same result. The exit code
-/// is 5 if a profile exceeds a limit, a file could not be checked, or kernels do not cover a profile (--allow-uncovered).
+/// is 5 if a profile exceeds a limit, a file could not be checked, or kernels do not cover a profile (unless --allow-uncovered).
 ///
 /// Example: `areograph scene archive demo --days 5 && areograph pedr qa demo/pedr --kernels demo/kernels/archive.tm --out qa`
 #[derive(Debug, Args)]
@@ -38,7 +38,7 @@ pub(super) struct Arguments {
     /// Delay of the time tags; 0 leaves them unchanged. The default is the bias of MOLA's clock.
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, default_value_t = usual_altimeter().clock_bias_s)]
     clock_bias_s: f64,
-    /// Threads; the default is one for every processor.
+    /// Threads; the default is one per core.
     #[arg(long)]
     threads: Option<std::num::NonZeroU16>,
     /// Do not report the archive as invalid if the kernels contain no position for some of its shots.

@@ -23,7 +23,7 @@ use crate::{
 ///
 /// The table has the columns of `footprints.parquet` except `windows` ("describe shots" lists them) in IAU 2000, and one row for
 /// every shot with a return, of any class; times are the tags of the files, TDB seconds past J2000. With conditions on
-/// `longitude_deg`, `latitude_deg`, `et_s` and `source_file` most of the archive is not read; with an index (`pedr index`), even
+/// `longitude_deg`, `latitude_deg`, `et_s` and `source_file`, most of the archive is not read; with an index (`pedr index`), even
 /// less is read. The answer is complete, or the command fails. Tables are read-only.
 ///
 /// Example: `areograph pedr sql archive "select orbit, count(*), avg(topography_m) from shots where latitude_deg between

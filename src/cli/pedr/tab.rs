@@ -23,7 +23,7 @@ use crate::{
     },
 };
 
-/// Prints shots as the text tables of pedr2tab, byte for byte, from the same PEDR2TAB.PRM and the same list of files.
+/// Prints shots in the text tables of pedr2tab, byte for byte, from the same PEDR2TAB.PRM and the same list of files.
 ///
 /// Known errors of pedr2tab are reproduced, unless --per-shot is given. Its errors, and the rules of --per-shot:
 ///
@@ -40,7 +40,7 @@ use crate::{
 ///   lists           end at the first file that cannot be opened             |  go on to the next; both end as an error
 ///
 /// Not reproduced: names are not cut at 64 characters and may contain dots and folders, more than 99,999 frames are read,
-/// and an invalid trigger channel does not read beyond its table.
+/// and an invalid trigger channel does not cause a read beyond its table.
 #[derive(Debug, Args)]
 #[command(
     verbatim_doc_comment,
@@ -84,7 +84,7 @@ struct NoMarker;
 /// Two files whose tables have the same name.
 #[derive(Debug, thiserror::Error, Cause)]
 #[error("would be the table of {} and of {}; expected one table per file", .0.display(), .1.display())]
-#[cause(Configuration: "name each file once; write files with the same name into different folders (--out), or all files \
+#[cause(Configuration: "name each file once; write tables with the same name into different folders (--out), or all files \
     into one table (T before its name in the preferences)")]
 struct OneName(PathBuf, PathBuf);
 

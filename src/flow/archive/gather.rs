@@ -25,8 +25,8 @@ pub(super) struct Gathered {
 
 /// A file whose shots another file contains as well.
 #[derive(Debug, thiserror::Error, Cause)]
-#[error("contains shots of orbit {orbit} that {} contains as well; shots of this file are rejected", .other.display())]
-#[cause(Input: "name only one of the two files, or move the other file away: every shot counts once, and areograph cannot \
+#[error("contains shots of orbit {orbit} that {} also contains; this file is not used", .other.display())]
+#[cause(Input: "name only one of the two files, or move one of them away: every shot counts once, and areograph cannot \
     decide which version of an orbit is meant")]
 struct SharedShots {
     orbit: u32,

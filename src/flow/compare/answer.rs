@@ -30,8 +30,8 @@ pub struct Answer<'a> {
     rule: &'static str,
     /// Positions of MGS relative to Mars minus the mean of all sets, along the axes of the mean orbit.
     orbit: Table<'a, OrbitSet<'a>, OrbitDifference<'a>>,
-    /// Attitudes relative to their mean, as rotations about the same axes; ground distances along the boresight, at epochs
-    /// where the boresight meets Mars.
+    /// Attitudes relative to their mean, as rotations about the axes of the mean orbit; ground distances along the
+    /// boresight, at epochs where the boresight meets Mars.
     #[serde(skip_serializing_if = "Option::is_none")]
     attitude: Option<Attitude<'a>>,
     start_utc: &'a str,

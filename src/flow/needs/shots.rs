@@ -49,7 +49,7 @@ pub(super) fn wishes(
         if globs.iter().any(|glob| glob.is_absent) {
             let note = |window: &String| {
                 format!(
-                    "window {window}: the box is not known before the image; no table of shots is queried"
+                    "window {window}: its box depends on an image; no table of shots is requested"
                 )
             };
             notes.extend(without_box.iter().map(note));

@@ -338,7 +338,7 @@ static ROWS: [Row; 15] = [
             ours: pictures,
             test: "tests/stages/plane.rs::seams_are_wider_than_bricks_are_within_and_local_evens_them_out",
         },
-        note: "The paper uses orthographic pictures as if they were conformal; the second number is the error of \
+        note: "The paper uses orthographic pictures as if they were conformal; the second number is the error due to \
                this assumption.",
     },
     Row {
@@ -394,8 +394,8 @@ static ROWS: [Row; 15] = [
             from: "nine pictures, 200 points, noise of 385 m, 20 seeds",
             ours: tie_deviations,
         },
-        note: "The size is a closed loop: deviations are 0.65 times the noise, which is chosen accordingly. The \
-               largest deviations require data.",
+        note: "The size is an input (closed loop): the rms deviation is 0.65 times the noise, which is chosen \
+               accordingly. The largest deviations require data.",
     },
     Row {
         id: "A77-07",
@@ -406,47 +406,49 @@ static ROWS: [Row; 15] = [
             from: "twelve controls with 0.8 km of noise, two of them in error by 17 and 19 km in Y",
             ours: gross_controls,
         },
-        note: "The size is a closed loop. If they were rejected one at a time, as in the paper, the two errors would \
-               mask each other in half of the cases.",
+        note: "The size is an input (closed loop). If they were rejected one at a time, as in the paper, the two \
+               errors would mask each other in half of the cases.",
     },
     Row {
         id: "A77-08",
         kind: Kind::Evidence,
-        place: "table 1",
+        place: "Table 1",
         what: "tie deviations of three bricks: largest δX δY, rms δX δY, m",
         account: Account::Data {
             printed: "59.0 56.1, 21.7 25.8; 98.5 62.2, 47.4 26.6; 43.2 33.4, 16.3 13.5",
         },
-        note: "The 25 pictures are on film that is not available; deviations follow the noise, as in A77-06.",
+        note: "The 25 pictures are on film that is not available; deviations are proportional to the noise, as in \
+               A77-06.",
     },
     Row {
         id: "A77-09",
         kind: Kind::Evidence,
-        place: "table 1",
+        place: "Table 1",
         what: "deviations from brick to brick: largest δX δY, rms δX δY, m",
         account: Account::Data {
             printed: "97.9 169.7, 53.9 84.7",
         },
-        note: "They are larger than within bricks. The synthetic net shows the same, and LOCAL reduces them \
+        note: "These deviations are larger than those within bricks. The synthetic net shows the same, and LOCAL \
+               reduces the deviations \
                (tests/stages/plane.rs::seams_are_wider_than_bricks_are_within_and_local_evens_them_out).",
     },
     Row {
         id: "A77-10",
         kind: Kind::Arithmetic,
-        place: "table 2",
+        place: "Table 2",
         what: "residuals of SCALE in the tertiary net",
         account: Account::Agrees {
             from: "the table's six points, as given minus computed",
             ours: table_2,
         },
         note: "Both residual columns have the heading δY; the first is δX. After a fit of shift and scale, both sums \
-               and the remaining scale are zero: rounding to 0.1 km permits 0.3 km in the sums and 125 ppm in scale, \
-               one standard deviation.",
+               and the remaining scale are zero: rounding to 0.1 km permits sums of up to 0.3 km and causes a standard \
+               deviation of 125 ppm in scale.",
     },
     Row {
         id: "A77-11",
         kind: Kind::Arithmetic,
-        place: "text on table 2",
+        place: "text on Table 2",
         what: "largest residual and rms",
         account: Account::Agrees {
             from: "the table's six points",

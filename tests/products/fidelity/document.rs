@@ -10,19 +10,21 @@ use super::row::{Comparison, Kind, NEEDS_DATA, Outcome, Paper};
 const RULES: [&str; 6] = [
     "This page compares numbers that five papers publish in their tables, equations and results with numbers computed \
      by areograph. Numbers inside figures are not included. A row without a computed number states the reason.",
-    "Every row has one of four kinds, which states the significance of an agreement. Only evidence can be met. \
-     Arithmetic on a paper's own numbers tests the paper, constants are generally known, and a closed loop returns its \
-     input: none of these shows that areograph reproduces a result on the images of the papers.",
-    "Evidence has two sources. The first is real MOLA shots in six windows, two of them from the passes of Table 2 at \
-     Gusev (PEDR, through the Mars Orbital Data Explorer). The second is code without access to the published value, \
-     on circular orbits computed from first principles. Kernels, images and film of the papers are not available; rows \
-     that require them state this.",
+    "Each row is of one of four kinds, and the kind states what an agreement signifies. Only evidence can have the \
+     verdict “met”. Arithmetic on a paper's own numbers tests the paper, constants are generally known, and a closed \
+     loop returns its input: none of these shows that areograph reproduces a result that the papers obtained from \
+     their images.",
+    "Evidence has two sources. The first is real MOLA shots in four windows (PEDR, through the Mars Orbital Data \
+     Explorer); two passes in the window at Gusev are those of Table 2. The second is results of code that has no \
+     access to the published values, on circular orbits computed from first principles. Kernels, images and film of \
+     the papers are not available; rows that require them state this.",
     "Closed loops are built with published values: times, exposures, clock errors of the size in Table 5 (2005), \
      camera errors of the size in Table 5 (2023), and noise of tie deviations. E04-01275 has the 8064 lines that Table \
-     4 requires, not the 7424 lines of Table 2. Tolerances apply to the unrounded value.",
-    "Numbers that a paper does not publish are in a separate column: they are derived from its numbers, or are from another paper.",
-    "The papers contain contradictions and misprints. Such rows are explained: they state the published value, the \
-     computed value, and the reason for the difference.",
+     4 requires, not the 7424 lines of Table 2. Tolerances apply to the unrounded computed value.",
+    "Numbers that a paper does not publish are in a separate column: they are derived from its numbers or taken from \
+     another paper.",
+    "The papers contain contradictions and misprints. The rows concerned have the verdict “explained”: they state the \
+     published value, the computed value, and the reason for the difference.",
 ];
 
 /// The list with what came of it.

@@ -29,7 +29,7 @@ const FOCAL_LENGTH_M: f64 = 0.175;
 const PITCH_M: f64 = 7e-6;
 const DETECTORS: f64 = 5_184.0;
 
-/// A line of tables 5 to 7: tie residuals across, along and together, control points in plan, all in pixels, then
+/// A line of Tables 5 to 7: tie residuals across, along and together, control points in plan, all in pixels, then
 /// metres; heights of the pair, metres.
 struct Line {
     camera: &'static str,
@@ -94,7 +94,7 @@ const CALIBRATED: [[Line; 2]; 3] = [
         line("S2", [1.016, 0.078], "1.019", [10.469, 286.364]),
     ],
 ];
-/// Heights of the orbits of tables 6 and 7, metres.
+/// Heights of the orbits of Tables 6 and 7, metres.
 const HEIGHTS_M: [[f64; 2]; 3] = [[477.180, 66.032], [471.415, 80.013], [682.407, 256.643]];
 /// What the text takes for a pixel, metres.
 const TEXT_PIXEL_M: f64 = 30.0;
@@ -163,7 +163,7 @@ fn before() -> Vec<Comparison> {
     let (figures, control) = of_step("before");
     let [plane_px, plane_m] = PLANE;
     vec![
-        number("ties across, px", "12.081", across_px(figures), 1).share(0.05),
+        number("tie points across, px", "12.081", across_px(figures), 1).share(0.05),
         number("control in plan, px", "36.195", plan(control, plane_px), 1).shown(),
         number("control in plan, m", "1049.461", plan(control, plane_m), 0).shown(),
         number("height, m", "507.214", control.height_m.unwrap(), 0).shown(),
@@ -175,7 +175,7 @@ fn after() -> Vec<Comparison> {
     let [plane_px, plane_m] = PLANE;
     vec![
         // No worse than the print: noise of the scene's measurements and control is its own.
-        number("ties across, px", "0.298", across_px(figures), 3).at_most(0.298),
+        number("tie points across, px", "0.298", across_px(figures), 3).at_most(0.298),
         number("control in plan, px", "5.650", plan(control, plane_px), 2).at_most(5.65),
         number("control in plan, m", "145.314", plan(control, plane_m), 0).share(0.1),
         number("height, m", "63.978", control.height_m.unwrap(), 1).at_most(63.978),
@@ -190,7 +190,7 @@ fn elsewhere() -> Vec<Comparison> {
     let times = |of: f64| format!("{of:.1}");
     let plan_times = plan(before, |of| of.plane_m) / plan(after, |of| of.plane_m);
     vec![
-        number("ties across, px", "0.333", across_px(&orbit.after), 3).at_most(0.333),
+        number("tie points across, px", "0.333", across_px(&orbit.after), 3).at_most(0.333),
         derived(
             "plan, before over after",
             times(i818_before / i818_after),
@@ -330,32 +330,38 @@ fn abstract_of_it() -> Vec<Comparison> {
         .map(tie_px)
         .fold(f64::INFINITY, f64::min);
     vec![
-        number("ties of I864 before, px", "12", tie_px(&I864_BEFORE[1]), 1).within(0.5),
-        number("ties before, more than, px", "6", least_before_px, 1).between(6.0, 7.0),
         number(
-            "ties after, less than, px",
+            "tie points of I864 before, px",
+            "12",
+            tie_px(&I864_BEFORE[1]),
+            1,
+        )
+        .within(0.5),
+        number("tie points before, more than, px", "6", least_before_px, 1).between(6.0, 7.0),
+        number(
+            "tie points after, less than, px",
             "1",
             largest(&CALIBRATED, tie_px),
             2,
         )
         .departs(0.01),
         number(
-            "plane before, m",
+            "plan before, m",
             "900",
             mean(&DIRECT, |line| line.plane_m),
             0,
         )
         .departs(100.0),
         number(
-            "plane after, m",
+            "plan after, m",
             "200",
             mean(&CALIBRATED, |line| line.plane_m),
             0,
         )
         .departs(40.0),
-        number("plane of I864 after, m", "140", i864_after_m, 0).within(6.0),
+        number("plan of I864 after, m", "140", i864_after_m, 0).within(6.0),
         number(
-            "plane after elsewhere, less than, m",
+            "plan after elsewhere, less than, m",
             "300",
             worst_after_m,
             1,
@@ -368,7 +374,7 @@ static ROWS: [Row; 25] = [
     Row {
         id: "L23-01",
         kind: Kind::Arithmetic,
-        place: "table 1",
+        place: "Table 1",
         what: "HRSC: 175 mm, 7 × 7 µm, 5272 detectors per line, of which 5184 are used, nine lines, ±12.8° and ±18.9°",
         account: Account::Agrees {
             from: "focal length, pitch and angles of the table; config/instruments/hrsc_s1.toml",
@@ -382,7 +388,7 @@ static ROWS: [Row; 25] = [
         place: "section 1",
         what: "resolution and swath",
         account: Account::Agrees {
-            from: "table 1, 250 km",
+            from: "Table 1, 250 km",
             ours: resolution,
         },
         note: "",
@@ -390,7 +396,7 @@ static ROWS: [Row; 25] = [
     Row {
         id: "L23-03",
         kind: Kind::Constants,
-        place: "table 2",
+        place: "Table 2",
         what: "expected errors",
         account: Account::Input {
             from: "defaults of `[a_priori]`, `config/calibrations/example.toml`",
@@ -402,14 +408,14 @@ static ROWS: [Row; 25] = [
     Row {
         id: "L23-04",
         kind: Kind::Constants,
-        place: "table 3",
+        place: "Table 3",
         what: "images: day, best resolution, swath and length, centre",
         account: Account::NotYetComputed {
             printed: "I864 2018-11-29, 26.9 m, 83 × 648 km, 28.40 S 63.13 W; I818 2018-11-16, 27.4 m, 88 × 837 km, \
                       25.85 S 45.31 W; I863 2018-11-29, 28.3 m, 103 × 741 km, 30.58 S 37.91 E; I977 2019-01-01, 27.2 \
                       m, 85 × 563 km, 51.09 S 83.93 W",
         },
-        note: "The longitude of I863 is east, those of the other images are west.",
+        note: "The longitude of I863 is east; those of the other images are west.",
     },
     Row {
         id: "L23-05",
@@ -452,7 +458,7 @@ static ROWS: [Row; 25] = [
     Row {
         id: "L23-08",
         kind: Kind::Evidence,
-        place: "table 4",
+        place: "Table 4",
         what: "concordance of eight units before and after the shift",
         account: Account::Data {
             printed: "−0.645→0.971, 0.312→0.951, 0.794→0.971, 0.297→0.925, 0.719→0.943998, −0.268→0.976, \
@@ -463,102 +469,108 @@ static ROWS: [Row; 25] = [
     Row {
         id: "L23-09",
         kind: Kind::Arithmetic,
-        place: "table 5",
-        what: "I864 before: residual in the focal plane from its components",
+        place: "Table 5",
+        what: "I864 before calibration: residual in the focal plane from its components",
         account: Account::Agrees {
             from: "root of the sum of squares across and along",
             ours: || focal(&I864_BEFORE),
         },
-        note: "The errors are across the flight, as the column headings of the table state; the sentence “mainly along the \
-               flight” is wrong. This row contains no number computed by areograph (L23-22). Control points in plan, 25.077 \
-               and 36.195 px (682.675 and 1049.461 m), and height, 507.214 m, require data.",
+        note: "The errors are across the flight, as the column headings of the table state; the sentence “mainly along \
+               the flight” is wrong. No number in this row results from a calibration by areograph; see L23-22. The \
+               residuals of control points in plan, 25.077 and 36.195 px (682.675 and 1049.461 m), and in height, \
+               507.214 m, require data.",
     },
     Row {
         id: "L23-10",
         kind: Kind::Arithmetic,
-        place: "table 5",
-        what: "I864 after: residual in the focal plane from its components",
+        place: "Table 5",
+        what: "I864 after calibration: residual in the focal plane from its components",
         account: Account::Agrees {
             from: "root of the sum of squares across and along",
             ours: || focal(&I864_AFTER),
         },
-        note: "As for L23-09. Control points in plan (5.650 and 5.254 px; 145.314 and 144.605 m) and height (63.978 m) require data.",
+        note: "As for L23-09. The residuals in plan (5.650 and 5.254 px; 145.314 and 144.605 m) and height (63.978 m) \
+               require data.",
     },
     Row {
         id: "L23-11",
         kind: Kind::Arithmetic,
-        place: "table 6",
+        place: "Table 6",
         what: "I818 uncalibrated: residual in the focal plane from its components",
         account: Account::Agrees {
             from: "root of the sum of squares across and along",
             ours: || focal(&DIRECT[0]),
         },
-        note: "As for L23-09. Plan (24.252 and 30.791 px; 684.161 and 900.743 m) and height (477.180 m) require data.",
+        note: "As for L23-09. The residuals in plan (24.252 and 30.791 px; 684.161 and 900.743 m) and height (477.180 \
+               m) require data.",
     },
     Row {
         id: "L23-12",
         kind: Kind::Arithmetic,
-        place: "table 6",
+        place: "Table 6",
         what: "I863 uncalibrated: residual in the focal plane from its components",
         account: Account::Agrees {
             from: "root of the sum of squares across and along",
             ours: || focal(&DIRECT[1]),
         },
-        note: "As for L23-09. Plan (24.553 and 33.027 px; 704.422 and 911.537 m) and height (471.415 m) require data.",
+        note: "As for L23-09. The residuals in plan (24.553 and 33.027 px; 704.422 and 911.537 m) and height (471.415 \
+               m) require data.",
     },
     Row {
         id: "L23-13",
         kind: Kind::Arithmetic,
-        place: "table 6",
+        place: "Table 6",
         what: "I977 uncalibrated: residual in the focal plane from its components",
         account: Account::Agrees {
             from: "root of the sum of squares across and along",
             ours: || focal(&DIRECT[2]),
         },
-        note: "As for L23-09. Plan (21.709 and 29.345 px; 602.496 and 803.388 m) and height (682.407 m) require data.",
+        note: "As for L23-09. The residuals in plan (21.709 and 29.345 px; 602.496 and 803.388 m) and height (682.407 \
+               m) require data.",
     },
     Row {
         id: "L23-14",
         kind: Kind::Arithmetic,
-        place: "table 7",
+        place: "Table 7",
         what: "I818 with the parameters of I864: residual in the focal plane from its components",
         account: Account::Agrees {
             from: "root of the sum of squares across and along",
             ours: || focal(&CALIBRATED[0]),
         },
-        note: "As for L23-09. Plan (7.894 and 8.349 px; 217.017 and 235.313 m) and height (66.032 m) require data.",
+        note: "As for L23-09. The residuals in plan (7.894 and 8.349 px; 217.017 and 235.313 m) and height (66.032 m) \
+               require data.",
     },
     Row {
         id: "L23-15",
         kind: Kind::Arithmetic,
-        place: "table 7",
+        place: "Table 7",
         what: "I863 with the parameters of I864: residual in the focal plane from its components",
         account: Account::Agrees {
             from: "root of the sum of squares across and along",
             ours: || focal(&CALIBRATED[1]),
         },
-        note: "As for L23-09. Plan (9.917 and 10.952 px; 273.349 and 301.776 m) and height (80.013 m) require data. The second value \
-               in plan exceeds the “better than 300 m” of the conclusions.",
+        note: "As for L23-09. The residuals in plan (9.917 and 10.952 px; 273.349 and 301.776 m) and height (80.013 m) \
+               require data. The second value in plan exceeds the “better than 300 m” of the conclusions.",
     },
     Row {
         id: "L23-16",
         kind: Kind::Arithmetic,
-        place: "table 7",
+        place: "Table 7",
         what: "I977 with the parameters of I864: residual in the focal plane from its components",
         account: Account::Agrees {
             from: "root of the sum of squares across and along",
             ours: || focal(&CALIBRATED[2]),
         },
-        note: "As for L23-09. Plan (6.681 and 10.469 px; 178.716 and 286.364 m) and height (256.643 m) require data. The row does \
-               not meet “below 1 px” and “within 100 m”.",
+        note: "As for L23-09. The residuals in plan (6.681 and 10.469 px; 178.716 and 286.364 m) and height (256.643 \
+               m) require data. The row meets neither “below 1 px” nor “within 100 m”.",
     },
     Row {
         id: "L23-17",
         kind: Kind::Arithmetic,
-        place: "text on tables 6 and 7",
-        what: "plan before and after",
+        place: "text on Tables 6 and 7",
+        what: "residuals in plan before and after calibration",
         account: Account::Explained {
-            from: "means of the six lines of tables 6 and 7",
+            from: "means of the six lines of Tables 6 and 7",
             ours: plane_summary,
         },
         note: "The text converts metres into pixels of 30 m; according to the tables, a pixel measures 25.7 to 29.3 m, \
@@ -567,10 +579,10 @@ static ROWS: [Row; 25] = [
     Row {
         id: "L23-18",
         kind: Kind::Arithmetic,
-        place: "text on tables 6 and 7",
-        what: "heights before and after",
+        place: "text on Tables 6 and 7",
+        what: "residuals in height before and after calibration",
         account: Account::Agrees {
-            from: "tables 6 and 7, 30 m per pixel",
+            from: "Tables 6 and 7, 30 m per pixel",
             ours: height_summary,
         },
         note: "",
@@ -581,7 +593,7 @@ static ROWS: [Row; 25] = [
         place: "abstract, key points, conclusions",
         what: "improvement",
         account: Account::Explained {
-            from: "tables 5 to 7",
+            from: "Tables 5 to 7",
             ours: abstract_of_it,
         },
         note: "The paper rounds generously; I977 and I863 do not meet the claims that it makes for all images. For heights, 500 → \
@@ -611,8 +623,8 @@ static ROWS: [Row; 25] = [
     Row {
         id: "L23-22",
         kind: Kind::ClosedLoop,
-        place: "table 5",
-        what: "I864 before, a pair",
+        place: "Table 5",
+        what: "I864 before calibration, a pair",
         account: Account::InPart {
             from: "synthetic lines with errors of the published size, withheld points",
             ours: before,
@@ -624,8 +636,8 @@ static ROWS: [Row; 25] = [
     Row {
         id: "L23-23",
         kind: Kind::ClosedLoop,
-        place: "table 5",
-        what: "I864 after, a pair",
+        place: "Table 5",
+        what: "I864 after calibration, a pair",
         account: Account::Agrees {
             from: "the same lines after calibration, withheld points",
             ours: after,
@@ -636,13 +648,13 @@ static ROWS: [Row; 25] = [
     Row {
         id: "L23-24",
         kind: Kind::ClosedLoop,
-        place: "table 7",
+        place: "Table 7",
         what: "another orbit with the parameters of I864, a pair",
         account: Account::Agrees {
             from: "the synthetic lines in another orbit, with the parameters of the first orbit",
             ours: elsewhere,
         },
-        note: "A comparison with tables 6 and 7 requires images of those orbits.",
+        note: "A comparison with Tables 6 and 7 requires images of those orbits.",
     },
     Row {
         id: "L23-25",
@@ -652,6 +664,6 @@ static ROWS: [Row; 25] = [
         account: Account::Cited {
             printed: "1,138 orbits of HRSC; about two months between calibration and validation orbits; heights of 2.3 px",
         },
-        note: "The dates in table 3 span 46 days.",
+        note: "The dates in Table 3 span 46 days.",
     },
 ];

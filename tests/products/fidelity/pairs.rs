@@ -43,7 +43,7 @@ pub(crate) enum Site {
 }
 
 impl Site {
-    /// Columns of table 2: the image that looks down, the other; and whether the former comes first.
+    /// Columns of Table 2: the image that looks down, the other; and whether the former comes first.
     const fn columns(self) -> ([usize; 2], bool) {
         match self {
             Self::Eos => ([0, 1], true),
@@ -52,7 +52,7 @@ impl Site {
         }
     }
 
-    /// Mean residuals along the track in table 5, of the image that looks down and of the other, lines.
+    /// Mean residuals along the track in Table 5, of the image that looks down and of the other, lines.
     const fn disagreement_lines(self) -> [f64; 2] {
         match self {
             Self::Eos => [-33.82, 20.52],
@@ -61,7 +61,7 @@ impl Site {
         }
     }
 
-    /// Tie points of table 5.
+    /// Tie points of Table 5.
     const fn ties(self) -> usize {
         match self {
             Self::Eos => 162,
@@ -77,7 +77,7 @@ impl Site {
         [below, off_nadir(oblique, &below)]
     }
 
-    /// Ties alone, measured with a line's noise in images whose clocks are off by table 5; ten times as many as there,
+    /// Ties alone, measured with a line's noise in images whose clocks are off by Table 5; ten times as many as there,
     /// so that chance counts less.
     pub(crate) fn intersected(self) -> Pair {
         let recipe = Recipe {

@@ -23,7 +23,7 @@ pub(crate) static PAPER: Paper = Paper {
     rows: &[&ROWS],
 };
 
-/// Lines from the middle and places in the line of the points of table 2, by an independent computation with the same
+/// Lines from the middle and places in the line of the points of Table 2, by an independent computation with the same
 /// formula.
 const POINTS_IN_IMAGE: [[&str; 2]; 10] = [
     ["-2681.91", "194.94"],
@@ -234,11 +234,11 @@ static ROWS: [Row; 9] = [
     Row {
         id: "S02-01",
         kind: Kind::Arithmetic,
-        place: "table 1",
+        place: "Table 1",
         what: "orientation of the right image, start and end: X 2743.679, 2749.133; Y −2453.358, −2450.626; Z \
                −895.114, −836.828 km; ω 11.3701, 12.1810; φ −75.9648, −76.8692; κ −126.576, −125.6728 °",
         account: Account::Explained {
-            from: "the table; angle between boresight and nadir with R = [κ]₃ [φ]₂ [ω]₁; emission angle of table 2 in 2005",
+            from: "the table; angle between boresight and nadir with R = [κ]₃ [φ]₂ [ω]₁; emission angle of Table 2 in 2005",
             ours: right,
         },
         note: "The Y of the start is misprinted; the correct value is −2435.358. With any other order or sense of the \
@@ -247,7 +247,7 @@ static ROWS: [Row; 9] = [
     Row {
         id: "S02-02",
         kind: Kind::Arithmetic,
-        place: "table 1",
+        place: "Table 1",
         what: "orientation of the left image, start and end: X 2638.162, 2640.863; Y −2549.221, −2557.746; Z \
                −891.875, −860.101 km; ω −8.6296, −8.6392; φ −75.9467, −75.9452; κ −124.5666, −124.5345 °",
         account: Account::Explained {
@@ -255,13 +255,13 @@ static ROWS: [Row; 9] = [
             ours: left,
         },
         note: "The emission angle is 17.97° in the paper of 2005, but 22.0° according to these angles, which also \
-               place the points of table 2 far outside the image. These angles cannot serve as a reference for \
+               place the points of Table 2 far outside the image. These angles cannot serve as a reference for \
                pointing.",
     },
     Row {
         id: "S02-03",
         kind: Kind::Arithmetic,
-        place: "table 1",
+        place: "Table 1",
         what: "base and height",
         account: Account::Agrees {
             from: "the table, across the flight of the right image",
@@ -272,10 +272,10 @@ static ROWS: [Row; 9] = [
     Row {
         id: "S02-04",
         kind: Kind::Arithmetic,
-        place: "table 2",
+        place: "Table 2",
         what: "ten MOLA points in E02-02855",
         account: Account::Agrees {
-            from: "orientation of first order through table 1 with the corrected Y, 9856 lines, 3500 mm, 39 µm",
+            from: "orientation of first order through Table 1 with the corrected Y, 9856 lines, 3500 mm, 39 µm",
             ours: points,
         },
         note: "Image coordinates are not published: the values in the column of unpublished numbers are from an \
@@ -285,13 +285,13 @@ static ROWS: [Row; 9] = [
     Row {
         id: "S02-05",
         kind: Kind::Arithmetic,
-        place: "table 2",
+        place: "Table 2",
         what: "spacing of points",
         account: Account::Agrees {
             from: "the ten points; gaps of two and three",
             ours: spacing,
         },
-        note: "Successive rows are not consecutive shots.",
+        note: "Successive rows are not always consecutive shots.",
     },
     Row {
         id: "S02-06",
@@ -301,7 +301,7 @@ static ROWS: [Row; 9] = [
         account: Account::Data {
             printed: "about 1–2 footprints",
         },
-        note: "The paper compares visually; S05-47 is the closed loop.",
+        note: "The paper compared the images visually; S05-47 is the closed loop.",
     },
     Row {
         id: "S02-07",
@@ -315,7 +315,7 @@ static ROWS: [Row; 9] = [
         note: "3396 km is the mean equatorial radius of the areoid, not of the ellipsoid; at a single longitude, the \
                areoid departs from its mean by some hundred metres. areograph subtracts the areoid radius that PEDR \
                files state for each shot. The paper uses radii with all corrections, including crossover residuals. \
-               The text converts areocentric latitudes to Cartesian coordinates as if they were areographic; areograph \
+               Its text converts areocentric latitudes to Cartesian coordinates as if they were areographic; areograph \
                does not.",
     },
     Row {
@@ -326,7 +326,7 @@ static ROWS: [Row; 9] = [
         account: Account::Cited {
             printed: "altitude about 400 km; narrow angle 1–5 m, wide angle 230–500 m",
         },
-        note: "Its own table gives 380.6 km.",
+        note: "The paper's own table gives 380.6 km.",
     },
     Row {
         id: "S02-09",

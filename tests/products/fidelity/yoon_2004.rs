@@ -187,7 +187,7 @@ fn disagreement() -> Vec<Comparison> {
             let ours_m: f64 = (printed.iter().zip(table_5.columns))
                 .map(|(px, column)| px.abs() * TABLE_2[column].line_spacing_m())
                 .sum();
-            let of = format!("{site:?}, table 3 compared with table 5 of 2005, m");
+            let of = format!("{site:?}, Table 3 compared with Table 5 of 2005, m");
             let ours = derived(of, fixed(table_5.disagreement_m(), 1), ours_m, 1);
             if *site == Site::Eos {
                 ours.departs(100.0)
@@ -203,7 +203,7 @@ fn printed_sigmas(site: Site) -> Vec<Comparison> {
     let (footprints, ties, sigma0) = TABLE_4[site as usize];
     vec![
         beyond_reach("MOLA σX σY σZ, m", footprints.join(" ")),
-        beyond_reach("ties σX σY σZ, m", ties.join(" ")),
+        beyond_reach("tie points σX σY σZ, m", ties.join(" ")),
         beyond_reach("σ0, px", sigma0),
     ]
 }
@@ -214,7 +214,7 @@ fn gusev_sigmas() -> Vec<Comparison> {
     let mut all = Vec::new();
     for (what, printed, ours) in [
         ("MOLA", footprints, adjusted.sigmas_m(true)),
-        ("ties", ties, adjusted.sigmas_m(false)),
+        ("tie points", ties, adjusted.sigmas_m(false)),
     ] {
         for ((axis, printed), ours) in AXES.iter().zip(printed).zip(ours) {
             // A factor of 3, its limits rounded inwards to a tenth of a metre.
@@ -265,9 +265,9 @@ fn remarks() -> Vec<Comparison> {
             0,
         )
         .departs(1.0),
-        number("ties at Eos, X, m", "91", 91.232, 0).within(0.5),
-        number("ties at Eos, Y, m", "107", 106.913, 0).within(0.5),
-        number("ties at Eos, Z, m", "55", 54.799, 0).within(0.5),
+        number("tie points at Eos, X, m", "91", 91.232, 0).within(0.5),
+        number("tie points at Eos, Y, m", "107", 106.913, 0).within(0.5),
+        number("tie points at Eos, Z, m", "55", 54.799, 0).within(0.5),
     ]
 }
 
@@ -296,7 +296,7 @@ static ROWS: [Row; 23] = [
     Row {
         id: "Y04-01",
         kind: Kind::ClosedLoop,
-        place: "table 1",
+        place: "Table 1",
         what: "images: date, exposure, file, GSD",
         account: Account::Input {
             from: "the synthetic mission; GSD from exposure time and ground speed",
@@ -318,12 +318,12 @@ static ROWS: [Row; 23] = [
         },
         note: "The 10 m for ranges represents the 7 m of the instrument. The standard deviation of MOLA's image \
                coordinates is not published: 74 and 4 px are a choice of areograph. The 100 and 200 m also apply to \
-               angles and rates, converted into angles by the range.",
+               angles and rates, after division by the range.",
     },
     Row {
         id: "Y04-03",
         kind: Kind::ClosedLoop,
-        place: "table 2",
+        place: "Table 2",
         what: "corrections of MOLA's ground points at Eos",
         account: Account::Explained {
             from: RECIPE,
@@ -335,14 +335,15 @@ static ROWS: [Row; 23] = [
             },
         },
         note: "Means of zero are a property of any such adjustment and are not evidence. The published “RMS” is the \
-               standard deviation about the mean. The computed standard deviations have different sizes, also at Gusev \
-               and Isidis: they follow from the noise of the shots, here 10 m on the ground and 7 m in range.",
+               standard deviation about the mean. The computed standard deviations differ from the published ones, \
+               also at Gusev and Isidis: they follow from the noise of the shots, here 10 m on the ground and 7 m in \
+               range.",
     },
     Row {
         id: "Y04-04",
         kind: Kind::Evidence,
-        place: "table 2",
-        what: "corrections of ties at Eos: mean/RMS of X, Y, Z, m",
+        place: "Table 2",
+        what: "corrections of tie points at Eos: mean/RMS of X, Y, Z, m",
         account: Account::Data {
             printed: "91.232/117.676, 106.913/151.426, 54.799/59.585",
         },
@@ -351,7 +352,7 @@ static ROWS: [Row; 23] = [
     Row {
         id: "Y04-05",
         kind: Kind::ClosedLoop,
-        place: "table 2",
+        place: "Table 2",
         what: "corrections of MOLA's ground points at Gusev",
         account: Account::Explained {
             from: RECIPE,
@@ -367,8 +368,8 @@ static ROWS: [Row; 23] = [
     Row {
         id: "Y04-06",
         kind: Kind::Evidence,
-        place: "table 2",
-        what: "corrections of ties at Gusev: mean/RMS of X, Y, Z, m",
+        place: "Table 2",
+        what: "corrections of tie points at Gusev: mean/RMS of X, Y, Z, m",
         account: Account::Data {
             printed: "−1.794/2.723, 0.371/0.340, 6.750/1.10",
         },
@@ -377,7 +378,7 @@ static ROWS: [Row; 23] = [
     Row {
         id: "Y04-07",
         kind: Kind::ClosedLoop,
-        place: "table 2",
+        place: "Table 2",
         what: "corrections of MOLA's ground points at Isidis",
         account: Account::Explained {
             from: RECIPE,
@@ -393,8 +394,8 @@ static ROWS: [Row; 23] = [
     Row {
         id: "Y04-08",
         kind: Kind::Evidence,
-        place: "table 2",
-        what: "corrections of ties at Isidis: mean/RMS of X, Y, Z, m",
+        place: "Table 2",
+        what: "corrections of tie points at Isidis: mean/RMS of X, Y, Z, m",
         account: Account::Data {
             printed: "0.222/0.189, −1.786/1.011, 3.144/3.148",
         },
@@ -403,7 +404,7 @@ static ROWS: [Row; 23] = [
     Row {
         id: "Y04-09",
         kind: Kind::Evidence,
-        place: "table 3",
+        place: "Table 3",
         what: "corrections of MOLA's image coordinates at Eos: mean/RMS of x1, y1, x2, y2, px",
         account: Account::Data {
             printed: "12.789/61.724, 4.040/15.915, −8.419/−18.116, 47.103/40.515",
@@ -413,8 +414,8 @@ static ROWS: [Row; 23] = [
     Row {
         id: "Y04-10",
         kind: Kind::ClosedLoop,
-        place: "table 3",
-        what: "residuals of ties at Eos",
+        place: "Table 3",
+        what: "residuals of tie points at Eos",
         account: Account::InPart {
             from: RECIPE,
             ours: || {
@@ -429,13 +430,13 @@ static ROWS: [Row; 23] = [
                 )
             },
         },
-        note: "The size of σ x is that of the noise, one line; geometry determines its distribution between the images. For \
-               σ y see Y04-12.",
+        note: "The size of σ x is that of the noise, one line; geometry determines its distribution between the \
+               images. For σ y, see Y04-12.",
     },
     Row {
         id: "Y04-11",
         kind: Kind::ClosedLoop,
-        place: "table 3",
+        place: "Table 3",
         what: "corrections of MOLA's image coordinates at Gusev (−24.176/0.774, 3.286/0.254, 24.895/0.104, \
                −2.695/0.163)",
         account: Account::Explained {
@@ -444,14 +445,15 @@ static ROWS: [Row; 23] = [
         },
         note: "Along the track, the signs are opposite, and the disagreement equals that of the intersection \
                residuals. Across the track, areograph departs from the published model: the paper uses the position in \
-               the measured line, where the skew of the flight causes a tenth of the along-track correction; areograph \
-               uses the line that sees the point (decision 0010), and the means vanish. The standard deviations require data.",
+               the measured line, where the skew of the flight causes a correction of one tenth of that along the \
+               track; areograph uses the line that sees the point (decision 0010), and the means vanish. The standard \
+               deviations require data.",
     },
     Row {
         id: "Y04-12",
         kind: Kind::ClosedLoop,
-        place: "table 3",
-        what: "residuals of ties at Gusev",
+        place: "Table 3",
+        what: "residuals of tie points at Gusev",
         account: Account::InPart {
             from: RECIPE,
             ours: || {
@@ -467,26 +469,27 @@ static ROWS: [Row; 23] = [
             },
         },
         note: "The paper uses the across-track coordinate in the measured line, where the skew of the flight causes a \
-               tenth of the along-track residual; areograph uses the line that sees the point. The height absorbs the \
-               remainder, so σ y does not represent an accuracy.",
+               residual of one tenth of that along the track; areograph uses the line that sees the point. The height \
+               absorbs the remainder, so σ y does not represent an accuracy.",
     },
     Row {
         id: "Y04-13",
         kind: Kind::ClosedLoop,
-        place: "table 3",
+        place: "Table 3",
         what: "corrections of MOLA's image coordinates at Isidis (35.044/0.082, −2.711/0.198, −24.789/1.519, \
                2.891/0.357)",
         account: Account::Explained {
             from: RECIPE,
             ours: || footprints_in_images(Site::Isidis),
         },
-        note: "As for Y04-11; here, the two values differ by 2.1 %, more than the tolerance of 2 % at Gusev: along the track, only the signs are compared.",
+        note: "As for Y04-11; here, the two values differ by 2.1 %, more than the tolerance of 2 % at Gusev; \
+               therefore, only the signs are compared along the track.",
     },
     Row {
         id: "Y04-14",
         kind: Kind::ClosedLoop,
-        place: "table 3",
-        what: "residuals of ties at Isidis",
+        place: "Table 3",
+        what: "residuals of tie points at Isidis",
         account: Account::InPart {
             from: RECIPE,
             ours: || {
@@ -506,10 +509,10 @@ static ROWS: [Row; 23] = [
     Row {
         id: "Y04-15",
         kind: Kind::Arithmetic,
-        place: "table 3",
+        place: "Table 3",
         what: "disagreement of the images along the track",
         account: Account::Explained {
-            from: "Σ |x| · line spacing, tables 3 of 2004 and 5 of 2005",
+            from: "Σ |x| · line spacing, Tables 3 of 2004 and 5 of 2005",
             ours: disagreement,
         },
         note: "At Eos, the two papers contradict each other.",
@@ -517,8 +520,8 @@ static ROWS: [Row; 23] = [
     Row {
         id: "Y04-16",
         kind: Kind::Evidence,
-        place: "table 4",
-        what: "standard deviations at Eos: MOLA, ties, σ0",
+        place: "Table 4",
+        what: "standard deviations at Eos: MOLA, tie points, σ0",
         account: Account::Data {
             printed: "9.210 8.941 10.183; 99.012 141.643 43.296; 1.037",
         },
@@ -527,7 +530,7 @@ static ROWS: [Row; 23] = [
     Row {
         id: "Y04-17",
         kind: Kind::ClosedLoop,
-        place: "table 4",
+        place: "Table 4",
         what: "standard deviations at Gusev",
         account: Account::Explained {
             from: RECIPE,
@@ -540,14 +543,14 @@ static ROWS: [Row; 23] = [
     Row {
         id: "Y04-18",
         kind: Kind::ClosedLoop,
-        place: "table 4",
+        place: "Table 4",
         what: "standard deviations at Isidis",
         account: Account::Explained {
             from: "10 m of MOLA's ground points times σ0; computed values from first principles",
             ours: isidis_sigmas,
         },
         note: "An adjustment with 10 m a priori cannot give 18.3 m: observations do not increase the standard \
-               deviation of an unknown. The computed value satisfies this.",
+               deviation of an unknown. The computed values satisfy this bound.",
     },
     Row {
         id: "Y04-19",
@@ -557,18 +560,18 @@ static ROWS: [Row; 23] = [
         account: Account::Data {
             printed: "about 1 to 2",
         },
-        note: "The residuals of a synthetic scene have the noise of its simulation.",
+        note: "The residuals of a synthetic scene have the size of the simulated noise.",
     },
     Row {
         id: "Y04-20",
         kind: Kind::Arithmetic,
-        place: "text on tables 2 and 4",
-        what: "MOLA moves by 4 mm to 0.1 mm; ties at Eos by 91, 107, 55 m",
+        place: "text on Tables 2 and 4",
+        what: "MOLA's ground points move by 4 mm to 0.1 mm; tie points at Eos by 91, 107, 55 m",
         account: Account::Explained {
-            from: "the rows of table 2",
+            from: "the rows of Table 2",
             ours: remarks,
         },
-        note: "At Isidis, Z moves by 23 mm.",
+        note: "At Isidis, the mean correction of Z is 23 mm.",
     },
     Row {
         id: "Y04-21",
@@ -579,8 +582,9 @@ static ROWS: [Row; 23] = [
             from: RECIPE,
             ours: misregistration,
         },
-        note: "Closed loop: the 249 m before the adjustment result from clock errors of the size in table 5 and from position errors. The \
-               result is relative: the two images agree afterwards, but their common position is not corrected.",
+        note: "Closed loop: the 249 m before the adjustment result from clock errors of the size in Table 5 of 2005 \
+               and from position errors. The result is relative: the two images agree afterwards, but their common \
+               position is not corrected.",
     },
     Row {
         id: "Y04-22",

@@ -37,7 +37,7 @@ const DERIVED: [(&str, &str); 14] = [
     ("Correction of least spread", "best − configured"),
     (
         "Correction of least spread",
-        "spread at the nearest scanned correction, m",
+        "least spread at a scanned correction, m",
     ),
     ("Images (Table 2", "duration, s"),
     ("Images (Table 2", "range at the middle, km"),
@@ -261,10 +261,10 @@ fn hardly_a_number_of_a_table_is_without_its_place() {
 const TEXTS: [(&str, &str); 20] = [
     ("Relief alone would determine", "tests/report_geometric"),
     ("Surface kriged", "300 m is part of what roughness means"),
-    ("At the tie points the surface", "names of profiles"),
+    ("At the tie points, the surface", "names of profiles"),
     ("E02-00665 and E02-01453", "the table below has the same"),
     ("Variance component", "levels of tests"),
-    ("Shown: the redundancy", "levels of tests"),
+    ("Shown: redundancy number", "levels of tests"),
     ("No two unknowns", "the limit of what is listed"),
     ("Light time", "spans over images; tests/light_time"),
     ("Limits for order 2", "the configuration"),

@@ -304,8 +304,8 @@ fn control_that_is_shifted_is_told_by_another_orbit() {
     });
     println!("{told}");
     assert!(
-        told.contains("orbit i818: control in the plane of camera s1")
-            && told.contains("a deterioration by more"),
+        told.contains("orbit i818: control in plan (camera s1)")
+            && told.contains("a deterioration of more"),
         "{told}"
     );
 }

@@ -26,10 +26,10 @@ A test derives every input from sound files whose truth is known, runs the progr
 - *stated as not tested*: the products are valid. The terminal, the page and the manifest list this error among those that the
   data of the site do not test.
 
-The error is that of the mean position of the adjusted tie points on one axis: east, north or up, whichever has the largest ratio to its
-stated standard deviation. For nets and calibrations, it is the root mean square over all points. Without an adjustment, it is the mean
+The error is that of the mean position of the adjusted tie points on one axis: east, north or up, whichever has the largest ratio of
+error to stated standard deviation. For nets and calibrations, it is the root mean square over all points. Without an adjustment, it is the mean
 distance on the ground between the positions that the images give for known pixels and the true positions; no uncertainty is stated for this
-distance. *Worst point* is the largest error of a single point, divided by its own stated standard deviation.
+distance. *Worst point* is the largest ratio of the error of a single point to its own stated standard deviation.
 The table of sound inputs is for comparison.
 
 The errors of products that are invalid, or that have a remark, can exceed the stated uncertainties. Scripts must check the exit code and the remarks.

@@ -216,7 +216,7 @@ fn quantities(sites: &[&Stated]) -> Vec<Quantity> {
             .collect();
         let independent = clocks.len();
         add(
-            &format!("clock of the altimeter by the ranges of a profile {name}"),
+            &format!("clock of the altimeter from the ranges of a profile {name}"),
             "s",
             clocks,
             independent,
@@ -287,7 +287,7 @@ fn counts(sites: &[Site]) -> String {
     let ties = TieCounts::of(sites);
     format!(
         "Invalid sites: {refused} of {sound} with correctly placed profiles, {noticed} of {misplaced} with a misplaced profile. \
-         Good tie points lost in valid sites: {} of {}; blunders kept: {}.\n",
+         Correct tie points rejected in valid sites: {} of {}; undetected blunders: {}.\n",
         ties.lost, ties.good, ties.kept_blunders
     )
 }
@@ -350,7 +350,7 @@ impl Variant {
             let lines = lines.map(|of| format!("{} ({:.2}; {})", of.name, of.z(), of.beyond()));
             let _infallible = writeln!(
                 text,
-                "Ratio (and values beyond) without the valid sites that have a misplaced profile, {misplaced} in number: {}.",
+                "Without the valid sites that have a misplaced profile (number: {misplaced}), ratio and number beyond 3 σ: {}.",
                 lines.collect::<Vec<_>>().join("; ")
             );
         }

@@ -142,7 +142,7 @@ const KINDS: &[Kind] = &[
         ..UNCHANGED
     },
     Kind {
-        words: "two thirds of the variance of the noise of tie points common to neighbours",
+        words: "noise of tie points, with two thirds of its variance common to neighbours",
         errors: |of| of.tie_noise_common = 2.0 / 3.0,
         ..UNCHANGED
     },
@@ -163,7 +163,7 @@ const KINDS: &[Kind] = &[
         ..UNCHANGED
     },
     Kind {
-        words: "errors of tie point samples of up to 2 pixels, in proportion to the square of the distance from the middle column",
+        words: "errors of up to 2 pixels in the samples of tie points, in proportion to the square of the distance from the middle column",
         files: |case, _| {
             in_ties(case, |_, [line, sample]| {
                 let off = (sample - MIDDLE_COLUMN) / MIDDLE_COLUMN;
@@ -231,7 +231,7 @@ const KINDS: &[Kind] = &[
         ..UNCHANGED
     },
     Kind {
-        words: "one frame in 20 too high by 300 m, with consistent ranges, like a cloud",
+        words: "one frame in 20 too high by 300 m, with consistent ranges, as for a cloud",
         files: |case, _| {
             of_shots(case, RADII, "add = 30000", Some(20));
             of_shots(case, RANGES, "add = -30000", Some(20));
@@ -357,23 +357,23 @@ fn ratio(pairs: &[Pair]) -> f64 {
 const INTRODUCTION: &str = "\
 # Errors that the adjustment does not model
 
-Each row adds or enlarges one error in four missions of three sites, whose other errors have the sizes that areograph assumes. A test
+Each row adds or enlarges one error in four missions of three sites each; the other errors have the sizes that areograph assumes. A test
 computes the table (`tests/truth/truth/unmodelled.rs`, in the long run) and writes this page. Sizes with σ are standard deviations of
-random errors; all others are constants. `range_check.mean_max_m` is 20 m, because the assumed orbits err by 5 m in radius. [*Wrong
-inputs*](wrong_inputs.md) lists mistakes of all sizes on one site with default limits; in the missions of [*Stated against
-true*](stated_against_true.md) many such errors occur together.
+random errors; all others are fixed values or ranges. `range_check.mean_max_m` is 20 m, because the assumed standard deviation of orbits is 5 m
+in radius. [*Wrong inputs*](wrong_inputs.md) lists mistakes of all sizes on one site with default limits; in the missions of [*Stated against
+true*](stated_against_true.md), many such errors occur together.
 
-*Invalid* counts the invalid sites. The other columns refer to the valid sites: the root mean square of the mean errors of the tie points of a
-site, with the ratio as in *Stated against true*; the ratios of the heights of single tie points, and of single footprints in plan.
+*Invalid* counts the invalid sites. The other columns refer to the valid sites: the root mean square, over the sites, of the mean error of their
+tie points, with the ratio as in *Stated against true*; the ratios of the heights of single tie points, and of single footprints in plan.
 Sites that are valid with remarks count as valid. *Answer*:
 
 - *invalid*: all sites are invalid.
 - *inside*: no ratio of means exceeds 1.25, and no ratio of single values 1.3.
-- *stated as not tested*: a ratio exceeds these limits. Terminal, page and manifest list errors of this kind as not tested; larger ones can
-  make a site invalid.
+- *stated as not tested*: a ratio exceeds these limits. The terminal, the page and the manifest list errors of this kind as not tested;
+  larger ones can make a site invalid.
 
 A drift of 0.08 mrad is eight times the standard deviation that areograph assumes. Tie points determine this drift. A correction of drift or bend
-by four to six standard deviations causes a remark. A larger one makes the site invalid even if the result is correct, because no other check
+of four to six standard deviations causes a remark. A larger correction makes the site invalid even if the result is correct, because no other check
 detects a wrong `CROSSTRACK_SUMMING` in both labels, which moves the ground by 707 m.
 
 | error | sites | invalid | height | east | north | single heights | footprints | answer |

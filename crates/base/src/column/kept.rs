@@ -27,7 +27,7 @@ static FILE: Mutex<Option<(Arc<File>, u64)>> = Mutex::new(None);
 /// Values that cannot be read from a temporary file.
 #[derive(Debug, thiserror::Error, Cause)]
 #[error("values of shots cannot be read back from a temporary file")]
-#[cause(Io: "check the disk of temporary files (TMPDIR), and repeat the command")]
+#[cause(Io: "check the disk that contains the temporary files (TMPDIR), then repeat the command")]
 struct LostValues;
 
 /// Ends the task: no value stands for a lost one, and the many readers of single values return no errors.

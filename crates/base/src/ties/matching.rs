@@ -35,7 +35,7 @@ pub enum Unmatched {
     #[error("the standard deviation is too large")]
     Uncertain,
     /// A cell of a terrain model that contradicts most neighbouring cells.
-    #[error("most neighbouring cells have different heights")]
+    #[error("its height differs from those of most neighbouring cells")]
     Alone,
 }
 

@@ -27,7 +27,8 @@ pub enum CheckOutcome {
     Pass,
 }
 
-/// A check of a site; of several profiles, images or pairs, the one that uses the largest share of the limit.
+/// A check of a site; if several profiles, images or pairs are checked, the one that uses the largest share of the
+/// limit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 pub struct Check {
@@ -46,7 +47,7 @@ pub struct Check {
     /// Largest permitted magnitude; for checks with a lower limit, the smallest permitted value.
     #[serde(default, skip_serializing_if = "crate::stored::is_left_out")]
     pub limit: Option<f64>,
-    /// Unit of both.
+    /// Unit of `value` and `limit`.
     pub unit: String,
 }
 

@@ -4,8 +4,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Kind of a check: independent data first, then data used in the result, then the mutual agreement of
-/// images.
+/// Kind of a check. Checks of independent data come first, then those of data used in the result, then those of the
+/// mutual agreement of images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(rename_all = "snake_case")]
@@ -45,7 +45,7 @@ pub enum CheckKind {
     /// Median height of adjusted tie points above the MOLA surface, which a default adjustment uses.
     HeightAfter,
     /// Share of tie points that lie more than 3.29 standard deviations from the MOLA surface, or were rejected for
-    /// this reason.
+    /// their height.
     HeightOutliers,
     /// Standard deviation of the mean height of the adjusted tie points.
     HeightSigma,
@@ -67,8 +67,7 @@ pub enum CheckKind {
     TieResidualsAlong,
     /// Standard deviation of unit weight of tie points across the track.
     TieResidualsAcross,
-    /// Standard deviation of unit weight of another kind of observation, the largest relative to the limit that
-    /// chance explains.
+    /// Standard deviation of unit weight of another kind of observation, the largest relative to the limit for chance.
     VarianceComponents,
     /// Share of the tie points not used in the adjustment.
     TiesRejected,
@@ -89,19 +88,21 @@ pub enum CheckKind {
     TableError,
     /// Number of skipped records.
     SkippedRecords,
-    /// Plan error of laser control withheld from a calibration, divided by the expected error.
+    /// Root mean square horizontal residual of laser control withheld from a calibration, divided by its expected
+    /// value.
     HeldBackPlane,
-    /// Height error of laser control withheld from a calibration, divided by the expected error.
+    /// Root mean square height residual of laser control withheld from a calibration, divided by its expected value.
     HeldBackHeight,
-    /// Plan error of laser control used in a calibration, divided by the expected error.
+    /// Root mean square horizontal residual of laser control used in a calibration, divided by its expected value.
     ControlPlane,
-    /// Height error of laser control used in a calibration, divided by the expected error.
+    /// Root mean square height residual of laser control used in a calibration, divided by its expected value.
     ControlHeight,
-    /// Degradation of the control of an orbit not used in a calibration, in standard deviations.
+    /// Increase, due to a calibration, of the residuals of control of an orbit that the calibration does not use, in
+    /// standard deviations.
     OtherOrbits,
-    /// Plan standard deviation of a tie point after a calibration; the limit is the a priori standard deviation.
+    /// Standard deviation of a tie point in plan after a calibration; the limit is the a priori standard deviation.
     PlaceKnown,
-    /// Height standard deviation of a tie point after a calibration; the limit is the a priori standard deviation.
+    /// Standard deviation of a tie point in height after a calibration; the limit is the a priori standard deviation.
     HeightKnown,
     /// Root mean square residual of tie points between the lines of a camera.
     LinesAgree,
@@ -119,9 +120,9 @@ pub enum CheckKind {
     HeldOutShots,
     /// Number of units of laser shots that were matched and kept.
     UnitsKept,
-    /// Share of the matching units that agree with each other.
+    /// Share of the matched units that agree with each other.
     UnitsAgree,
-    /// Median height of the terrain model above the laser.
+    /// Median height of the terrain model above the laser points.
     ModelBias,
     /// Number of redundant equations of a net.
     Redundancy,
@@ -139,7 +140,7 @@ pub enum CheckKind {
     PictureScale,
     /// Stretch of the controls of a net relative to the pictures.
     ControlStretch,
-    /// Mean offset of the control of an orbit not used in a calibration, in standard deviations of one point.
+    /// Mean offset of the control of an orbit that a calibration does not use, in standard deviations of one point.
     OtherOrbitsOffset,
     /// Share of withheld profile stretches outside their stated 99.7 % interval.
     WithheldStretches,
@@ -158,7 +159,7 @@ impl CheckKind {
             Self::HeightBefore => "Tie points above {altimeter}, before (median)",
             Self::HeightOutliers => "Tie points beyond 3.29 σ of {altimeter}",
             Self::ProfilesApart => "Disagreement of {altimeter} profiles",
-            Self::WithheldStretches => "Withheld profiles beyond the stated 99.7 %",
+            Self::WithheldStretches => "Withheld profiles outside the stated 99.7 % interval",
             Self::SurfaceFilled => "Terrain model, completeness",
             Self::SurfaceHeight => "{altimeter} above the terrain model (median)",
             Self::SurfaceSpread => "Spread of {altimeter} about the terrain model",
@@ -176,7 +177,7 @@ impl CheckKind {
             Self::SupportPosition => "Position in support data against the {shot_source}",
             Self::BeamAlong => "Laser beam against its mounting, along track",
             Self::BeamAcross => "Laser beam against its mounting, across track",
-            Self::BoresightMeets => "Boresight meets the body (epochs)",
+            Self::BoresightMeets => "Boresight intersects the body (epochs)",
             Self::ParallaxAfter => "Along-track parallax, adjusted",
             Self::ParallaxBefore => "Along-track parallax, before",
             Self::TieResidualsAlong => "Tie residuals along track",
@@ -191,7 +192,7 @@ impl CheckKind {
             Self::PointingRmse => "Pointing model, RMSE",
             Self::TableError => "Camera table, interpolation error",
             Self::SkippedRecords => "Records skipped",
-            Self::HeldBackPlane => "Withheld control, plan error",
+            Self::HeldBackPlane => "Withheld control, plan residual / expected (RMS)",
             Self::HeldBackHeight => "Withheld control, height error",
             Self::ControlPlane => "Control used, plan error",
             Self::ControlHeight => "Control used, height error",
@@ -206,7 +207,7 @@ impl CheckKind {
             Self::RoundControl => "Control residuals, change in the last round",
             Self::HeldOutShots => "Withheld shots, model − laser",
             Self::UnitsKept => "Units kept",
-            Self::UnitsAgree => "Matching units that agree",
+            Self::UnitsAgree => "Matched units that agree",
             Self::ModelBias => "Model above the laser (median)",
             Self::Redundancy => "Redundancy",
             Self::MeasurementsRemoved => "Measurements rejected as blunders",

@@ -32,7 +32,7 @@ impl fmt::Display for Accept {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::ZeroOr(low, f64::INFINITY) => {
-                write!(formatter, "0, or a number of at least {low}, or inf")
+                write!(formatter, "0, a number of at least {low}, or inf")
             }
             Self::ZeroOr(low, high) => {
                 write!(formatter, "0, or a number from {low} to {high}")

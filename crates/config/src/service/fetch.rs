@@ -9,7 +9,7 @@ use crate::{
 };
 
 declare_table! {
-    /// Retrieval of archive files, as with `areograph fetch`: copies of the indexes, and missing files that sites name.
+    /// Retrieval of archive files, as by `areograph fetch`: copies of the indexes, and missing files that sites name.
     /// Files with different content are never replaced. Failures cause alerts, and the night continues.
     pub struct FetchConfig {
         /// Whether every night begins with the retrieval of archive files.
@@ -21,9 +21,9 @@ declare_table! {
         generic_kernels: Option<PathBuf> = key(text()).unused(r#""kernels/generic""#).then(|path, keys: &mut Keys<'_, '_>| {
             path.map(|path| keys.review().resolve(&path))
         }),
-        /// Table with other hosts or layouts, in the form of `config/archives/mgs.toml`.
+        /// File with other hosts or layouts, in the form of `config/archives/mgs.toml`.
         archives: Option<PathBuf> = key(FILE).unused(r#""archives.toml""#),
-        /// Longest time for retrieval of the indexes, and of the files of one site.
+        /// Longest time for the retrieval of the indexes, and for that of the files of each site.
         limit_s: f64 = key(from_to(1.0, 604_800.0)).or(14_400.0),
     }
 }

@@ -162,12 +162,12 @@ impl Planner<'_> {
         let planets: Vec<&KernelRow> = spk().filter(|row| !is_own(row)).collect();
         if planets.is_empty() {
             plan.notes.push(
-                "the index has no planetary ephemeris: unless the orbit kernels contain Mars and the Sun, put one into the \
-                 kernel folder (de*.bsp, and mar*.bsp where orbits are relative to the barycentre of Mars)"
+                "the index lists no planetary ephemeris: unless the orbit kernels contain Mars and the Sun, put one \
+                 into the kernel folder (de*.bsp, and mar*.bsp where orbits are relative to the barycentre of Mars)"
                     .to_owned(),
             );
         } else {
-            let what = "planets, from the departure of the sunlight";
+            let what = "planets, including the light time from the Sun";
             plan.add(self.covering(planets.into_iter(), spans, [with_sun; 2], what));
         }
         plan

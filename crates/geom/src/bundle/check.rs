@@ -89,7 +89,7 @@ fn check_bus<M>(network: &Network<M>, bus: &CommonBus) -> Result<(), BundleError
     let part = Part::Images;
     let what = "standard deviation of the laser boresight";
     deviation(part, what, bus.boresight_sigma_rad)?;
-    let what = "standard deviation of the laser line time offset";
+    let what = "standard deviation of the line-time offset relative to the laser";
     deviation(part, what, bus.line_time_sigma_s)?;
     if bus.profiles.len() != network.range_bias_sigmas_m.len() {
         let missing = Part::Profile(bus.profiles.len().min(network.range_bias_sigmas_m.len()));

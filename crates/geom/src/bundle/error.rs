@@ -9,7 +9,7 @@ use super::{
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BundleError {
     /// An invalid standard deviation, coordinate or number.
-    #[error("{what} of {part} is {value}, expected {expected}")]
+    #[error("{what} of {part} is {value}; expected {expected}")]
     Value {
         /// The part to which it belongs.
         part: Part,
@@ -35,7 +35,9 @@ pub enum BundleError {
         unknowns: Vec<Unknown>,
     },
     /// Fewer observations than unknowns.
-    #[error("{observations} observations for {unknowns} unknowns")]
+    #[error(
+        "{observations} observations for {unknowns} unknowns; expected at least as many observations"
+    )]
     Underdetermined {
         /// Observations.
         observations: usize,

@@ -79,7 +79,7 @@ impl Unknown {
             Self::ProfileShift { axis, .. } => {
                 format!("shift {}", ["east", "north", "up"][axis % 3])
             }
-            Self::LineTime { .. } => "laser line time offset".to_owned(),
+            Self::LineTime { .. } => "line-time offset relative to the laser".to_owned(),
             Self::Boresight { axis } => {
                 format!(
                     "{} boresight angle of the laser",

@@ -26,7 +26,7 @@ pub enum CalibrationError {
         why: SightError,
     },
     /// The iteration did not converge.
-    #[error("the adjustment does not converge in {STEPS_MAX} steps")]
+    #[error("the adjustment did not converge after {STEPS_MAX} steps")]
     NotConverged,
     /// A free combination has no a priori standard deviation and is not observed.
     #[error("the points do not determine the free parameters")]

@@ -14,7 +14,7 @@ pub enum FilmError {
     #[error("the four corner ticks enclose no area")]
     Flat,
     /// The mid-edge ticks are so far away that the correction is no longer one to one.
-    #[error("the mid-edge ticks deviate by a quarter of the picture or more")]
+    #[error("the mid-edge ticks deviate by a quarter of the picture size or more")]
     TooLarge,
 }
 

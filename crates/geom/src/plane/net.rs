@@ -49,8 +49,8 @@ pub enum PlaneError {
     },
     /// A picture, and those tied to it only, can rotate, shrink or move.
     #[error(
-        "picture {picture} is tied to the net by {ties} points; expected two or more distinct points \
-         on a part of the net with controls"
+        "picture {picture} is tied to the net by {ties} points; expected two or more distinct points, in a part of the \
+         net with controls"
     )]
     UnderconnectedPicture {
         /// The picture.
@@ -78,13 +78,13 @@ pub enum PlaneError {
         second: usize,
     },
     /// A picture has the opposite handedness to its neighbours.
-    #[error("picture {picture} is a mirror image compared with its neighbours")]
+    #[error("picture {picture} is mirrored relative to its neighbours")]
     MirroredPicture {
         /// The picture.
         picture: usize,
     },
     /// All pictures have the opposite handedness to the map.
-    #[error("the pictures are a mirror image of the controls")]
+    #[error("the pictures are mirrored relative to the controls")]
     MirroredFigure,
 }
 

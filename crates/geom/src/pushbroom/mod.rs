@@ -113,7 +113,7 @@ pub enum Unseen {
     #[error("behind the camera")]
     BehindCamera,
     /// The camera's x axis lies within 0.6° of across the flight: lines do not follow each other on the ground.
-    #[error("the camera flies across its lines")]
+    #[error("the camera moves along its detector line")]
     AcrossFlight,
     /// The steps grew three times in a row.
     #[error("the iteration diverges")]

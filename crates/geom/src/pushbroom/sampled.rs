@@ -38,7 +38,9 @@ pub enum SamplesError {
     #[error("{0} orientation samples; expected at least 3")]
     TooFew(usize),
     /// Lines that do not increase, or are not finite.
-    #[error("sample {row} at line {x} follows line {before}; expected increasing lines")]
+    #[error(
+        "sample {row} at line {x} follows a sample at line {before}; expected increasing lines"
+    )]
     NotIncreasing {
         /// Sample, counted from 0.
         row: usize,
@@ -48,7 +50,9 @@ pub enum SamplesError {
         before: f64,
     },
     /// A position that is not finite, or a matrix that is not a rotation.
-    #[error("sample {row} is not a position with a valid rotation (determinant {determinant})")]
+    #[error(
+        "sample {row} is invalid (determinant of the rotation {determinant}); expected a finite position and a rotation"
+    )]
     NotAPose {
         /// Sample, counted from 0.
         row: usize,

@@ -40,10 +40,10 @@ pub struct LeftOut {
     pub crossovers: usize,
     /// Height of the profile above the others, metres.
     pub above_m: f64,
-    /// Standard deviation of this height, metres.
+    /// Standard deviation of `above_m`, metres.
     pub sigma_m: f64,
-    /// Robust root mean square of the height differences at its crossovers, each divided by its standard deviation, which includes
-    /// shifts of both profiles.
+    /// Robust root mean square of the height differences at its crossovers, each divided by its standard deviation,
+    /// which includes the uncertainty of the shifts of both profiles.
     pub misfit: f64,
 }
 

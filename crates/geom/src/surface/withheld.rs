@@ -35,7 +35,7 @@ pub struct Withheld {
     pub shots: usize,
     /// Mean of measured minus predicted heights, metres.
     pub above_m: f64,
-    /// Standard deviation of this mean according to the surface, metres.
+    /// Standard deviation of `above_m` according to the surface, metres.
     pub sigma_m: f64,
     /// Distance to the nearest shot of another profile, metres.
     pub nearest_m: f64,
@@ -49,7 +49,7 @@ pub struct WithheldScore {
     pub stretches: usize,
     /// Shares of the stretches inside the stated intervals of 68.27, 95 and 99.7 %.
     pub inside: [f64; 3],
-    /// Mean log-likelihood of a stretch; for a normal distribution −½ z² − ln σ.
+    /// Mean log-likelihood of a stretch, which for a normal distribution would be −½ z² − ln σ.
     pub log_likelihood: f64,
     /// Mean of ln σ, σ in metres.
     pub log_sigma: f64,

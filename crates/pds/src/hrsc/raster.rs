@@ -210,7 +210,7 @@ impl Raster {
             }
             _ => (stated.rough > ROUGHER * other.rough).then(|| {
                 let times = stated.rough / other.rough.max(f64::MIN_POSITIVE);
-                format!("differences of adjacent samples are {times:.0} times smaller in the other byte order")
+                format!("differences of adjacent samples are {times:.0} times as large as in the other byte order")
             }),
         };
         match because {

@@ -59,7 +59,8 @@ pub enum EncodeError {
     },
     /// A coding that is supported for reading only.
     #[error(
-        "coding {0:?} is supported for reading only; expected raw, prediction with a table from 0 to 6, or cosines"
+        "coding {0:?} is supported for reading only; expected raw, prediction with a table from 0 to 6, or cosine \
+         transform"
     )]
     Coding(Coding),
 }

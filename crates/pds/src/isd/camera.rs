@@ -56,7 +56,8 @@ impl FocalLine {
             pixel_mm.is_finite() && pixel_mm > 1.0 / PIXELS_PER_MM_MAX
         });
         let inverse = inverse.ok_or_else(|| {
-            let expected = "coefficients independent of focal2pixel_lines, with at most 100000 pixels per millimetre";
+            let expected = "coefficients linearly independent of focal2pixel_lines, with at most 100000 pixels per \
+             millimetre";
             document.refused("focal2pixel_samples", expected)
         })?;
         let centre = document.object("detector_center")?;
@@ -143,7 +144,7 @@ pub(super) fn camera(
         },
         pointing: PointingTime {
             ck_bias_s: 0.0,
-            source: "support file: attitudes refer to its epochs".to_owned(),
+            source: "support data: attitudes refer to their epochs".to_owned(),
         },
     };
     match Distortion::check(&instrument) {

@@ -30,9 +30,9 @@ pub(crate) enum IsdError {
         "optical_distortion.radial.coefficients repeats the pixel pitch, {pitch_mm} mm; expected coefficients of a distortion"
     )]
     #[cause(
-        "configure the image by label and kernels. For MOC, ALE repeats the pixel pitch as distortion, states the period of \
-        a detector line instead of an image line, and begins the attitudes 1.15 s after the first line. areograph writes a \
-        camera model in ALE's light-time convention to exchange/centre"
+        "configure the image by label and kernels. For MOC, ALE repeats the pixel pitch as distortion, states the \
+         period of a detector line instead of that of an image line, and begins the attitudes 1.15 s after the first \
+         line. areograph writes a camera model in ALE's light-time convention to exchange/centre"
     )]
     PitchAsDistortion { pitch_mm: String },
 }

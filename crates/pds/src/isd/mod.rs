@@ -262,7 +262,8 @@ fn line_times(document: &Object<'_>) -> Result<LineTimes> {
     // Written so that NaN is rejected too.
     if !(late_s.abs() <= times.mean_period_s()) {
         let expected = format!(
-            "the time of the first line computed from line_scan_rate and center_ephemeris_time, {:.6}, within one line",
+            "the time of the first line according to line_scan_rate and center_ephemeris_time, {:.6} s, within one \
+             line period",
             times.start().seconds()
         );
         return Err(document.refused("starting_ephemeris_time", expected).into());

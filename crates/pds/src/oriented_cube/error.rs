@@ -4,7 +4,7 @@ use areograph_base::error::Cause;
 
 /// A cube whose tables cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error, Cause)]
-#[cause(Input: "run spiceinit on the cube again, or configure the image by label and kernels, or by support data (isd)")]
+#[cause(Input: "run spiceinit on the cube again, or configure the image by label and kernels or by support data (isd)")]
 pub(super) enum CubeError {
     #[error("not an ISIS cube: expected Object = IsisCube at the start of the file")]
     #[cause("name the cube in images.cube, and other labels in images.label")]

@@ -273,8 +273,8 @@ mod tests {
             (
                 |record| record.ground_longitude_change_microdegrees.set(1 << 20),
                 Reason::Track,
-                "the ground track moves by 1048576 microdegrees of longitude and 0 of latitude over the frame (62154 m); \
-                 expected at most 50000 m",
+                "the ground track moves by 1048576 microdegrees in longitude and 0 in latitude over the frame (62154 \
+                 m); expected at most 50000 m",
             ),
             (
                 |record| record.spacecraft_radius_cm.set(420_000_001),
@@ -309,7 +309,7 @@ mod tests {
             (
                 |record| record.spacecraft_latitude_change_microdegrees.set(1 << 18),
                 Reason::Track,
-                "the spacecraft moves by 0 microdegrees of longitude and 262144 of latitude over the frame (17295 m); \
+                "the spacecraft moves by 0 microdegrees in longitude and 262144 in latitude over the frame (17295 m); \
                  expected at most 15000 m",
             ),
         ];

@@ -109,7 +109,7 @@ pub enum RecordError {
     },
     /// Displacement of the ground track or of the spacecraft over the frame.
     #[error(
-        "{whose} moves by {longitude_microdegrees} microdegrees of longitude and {latitude_microdegrees} of latitude \
+        "{whose} moves by {longitude_microdegrees} microdegrees in longitude and {latitude_microdegrees} in latitude \
          over the frame ({metres:.0} m); expected at most {limit_m} m"
     )]
     Track {
@@ -174,8 +174,8 @@ pub enum RecordError {
     },
     /// Parallax against the direction of the beam.
     #[error(
-        "parallax in {whose} is {found:.4} m on the ground per metre of radius; expected {expected:.4} along the beam, \
-         within {limit:.4}"
+        "parallax in {whose} is {found:.4} m on the ground per metre of radius; expected {expected:.4} ± {limit:.4}, \
+         along the beam"
     )]
     Parallax {
         /// "latitude" or "longitude".

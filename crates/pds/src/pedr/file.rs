@@ -60,7 +60,7 @@ struct NotAFile;
 #[derive(Debug, thiserror::Error, Cause)]
 #[error("no valid record: {why}")]
 #[cause(Input: "{}", foreign.map_or(
-    "fetch the file again if it is a PEDR file (AP#####v.B), otherwise omit it",
+    "fetch the file again if it is a PEDR file (AP#####v.B); otherwise omit it",
     Foreign::advice,
 ))]
 struct NoGoodRecord {

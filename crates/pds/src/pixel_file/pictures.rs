@@ -140,8 +140,9 @@ impl TiffRows {
             DecodingResult::F32(numbers) => all(numbers),
             DecodingResult::F64(numbers) => numbers,
             _ => {
-                return Err(Picture::Tiff
-                    .refused("unsupported pixel type; expected 8 unsigned bits, 16 or 32 bits"));
+                return Err(Picture::Tiff.refused(
+                    "unsupported pixel type; expected 8 bits (unsigned), 16 bits or 32 bits",
+                ));
             }
         })
     }

@@ -186,7 +186,7 @@ fn tables_that_hold_no_shot_are_refused() {
     refused(&format!("{HEADER}\n"), "it has no rows");
     refused(
         "a,b\n1,2\n",
-        "no column is called \"et\" (shots.columns.et_s); the first row has a, b",
+        "unknown column \"et\" (shots.columns.et_s); the first row contains a, b",
     );
     let metres = ROW.replace("1735.0", "1735000");
     refused(

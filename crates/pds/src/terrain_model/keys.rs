@@ -74,7 +74,7 @@ impl GeoKeys {
                 (DOUBLES, 1) => Some(*doubles.get(usize::from(value)).ok_or_else(|| {
                     refused(
                         "GeoKeyDirectory",
-                        format!("key {key} is number {value} of {}", doubles.len()),
+                        format!("key {key} refers to number {value} of {}", doubles.len()),
                         "an existing number",
                     )
                 })?),

@@ -184,7 +184,7 @@ fn what_is_no_image_is_refused_with_what_was_expected() {
         (
             format!("{head}^IMAGE = 2\n"),
             0,
-            "the label has no END; expected that statement after its last line",
+            "the label has no END; expected this statement after the last line",
         ),
     ] {
         assert_eq!(refused(&label, pixels), message);

@@ -4,7 +4,8 @@
 pub(super) const DEFINITIONS: [(&str, &str); 16] = [
     (
         "before, after",
-        "results with the orientation from the kernels, and with the adjusted orientation; ground points are intersected again",
+        "results with the orientation from the kernels (before) and with the adjusted orientation (after), for which \
+         ground points are intersected again",
     ),
     (
         "focal",
@@ -18,26 +19,28 @@ pub(super) const DEFINITIONS: [(&str, &str); 16] = [
     (
         "heights",
         "heights of tie points above the {altimeter} surface, metres: before the adjustment, a test of the \
-         orientation; after the adjustment, its fit to the control",
+         orientation; after the adjustment, the fit of the points to their control",
     ),
     (
         "along_track_parallax_m",
-        "mean distance along the flight between the positions of tie points according to the two images, metres",
+        "absolute value of the mean displacement along the flight between the positions of tie points according to \
+         the two images, metres",
     ),
     (
         "along_track",
-        "the same with its sign, first minus second image, and its change with a rotation of each camera (range_m, metres \
-         per radian), with its line times (line_time_m_s), and with one offset of the attitude clock of both (clock_m_s), metres per \
-         second: input of areograph compare-readings. Absent where the images were not flown in the same direction, or \
-         are not apart across the track",
+        "this displacement with its sign, first minus second image, and its changes: with a rotation of each camera \
+         (range_m, metres per radian), with the line times of each image (line_time_m_s, metres per second), and with \
+         one offset of the attitude clock of both images (clock_m_s, metres per second); input of areograph \
+         compare-readings. Absent where the images were not flown in the same direction, or are not apart across the \
+         track",
     ),
     (
         "footprints",
         "position of a footprint in the second image, transferred from the first by the tie points, minus its projected \
-         position: lines and samples of the second image, metres on the ground, and distances between successive \
-         footprints. Only footprints that both images show, on a line between the lines of the tie points, are counted; \
-         outside are the footprints within the lines of both images that one image does not show. above_mola_m: heights \
-         at which the rays of these positions meet, minus the heights of the footprints",
+         position: in lines and samples of the second image, in metres on the ground, and in shot spacings. Only \
+         footprints that both images show on lines between those of the tie points are counted; outside is the number \
+         of footprints within the lines of both images that one image does not show. above_mola_m: heights at which \
+         the rays of these positions meet, minus the heights of the footprints",
     ),
     (
         "budget",
@@ -55,22 +58,23 @@ pub(super) const DEFINITIONS: [(&str, &str); 16] = [
     ),
     (
         "sigmas",
-        "standard deviations from a priori variances times the variance factor. The published model treats image \
-         coordinates of footprints, which are not independent, as independent measurements: its standard deviations \
-         describe the agreement of the images, not the accuracy of heights and positions",
+        "standard deviations from covariances that follow from a priori variances and are multiplied by the variance \
+         factor. The published model treats image coordinates of footprints, which are not independent, as \
+         independent measurements: its standard deviations describe the agreement of the images, not the accuracy of \
+         heights and positions",
     ),
     (
         "sigmas of images",
         "standard deviations of the camera pose at the exposure of a line. Position, pitch and line times are not \
          separated along the track: the position at the tag of a line may differ from the position at its exposure by \
          the distance flown in line_time_sigma_s, and the rotation compensates for this on the ground. Use position \
-         and rotation together. The standard deviations do not contain a time bias (time_bias_s)",
+         and rotation together. The standard deviations do not contain the uncertainty of a time bias (time_bias_s)",
     ),
     (
         "sigmas_m of shots",
-        "standard deviations including the shift of the profile (laser_surface.profile_plan_sigma_m, profile_sigma_m; \
-         adjusted values where spots determine the shift). All footprints of a profile share this shift, which does not \
-         average out. adjusted_footprints.parquet contains both parts",
+        "standard deviations including the uncertainty of the profile's shift (laser_surface.profile_plan_sigma_m, \
+         profile_sigma_m; adjusted values where spots determine the shift). All footprints of a profile share this \
+         shift, which does not average out. adjusted_footprints.parquet contains both parts",
     ),
     (
         "mean_sigma_m",
@@ -80,10 +84,10 @@ pub(super) const DEFINITIONS: [(&str, &str); 16] = [
     ),
     (
         "other_reading",
-        "where a pair disagrees by more than 100 m along the flight: the mean of the tie points in the other of two \
-         readings (all images equally likely to be in error, or one offset of the attitude clock, attitude_clock_s), \
-         minus the mean in the adjustment. No measurement decides between the readings: each standard deviation applies \
-         to its own reading",
+        "where a pair disagrees by more than 100 m along the flight: the mean position of the tie points in the other \
+         of two readings (all images equally likely to be in error, or one offset of the attitude clock, \
+         attitude_clock_s), minus their mean position in the adjustment. No measurement decides between the readings: \
+         each standard deviation applies to its own reading",
     ),
     (
         "boresight",

@@ -13,7 +13,8 @@ pub(super) struct OtherReadingDocument {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(transform = at("/prefixItems/1", "minimum", 0))]
     attitude_clock_s: Option<(f64, f64)>,
-    /// Mean of the tie points in the other reading minus their adjusted mean, east, north and up, metres.
+    /// Mean position of the tie points in the other reading minus their adjusted mean position, east, north and up,
+    /// metres.
     moved_m: [f64; 3],
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(transform = none_negative)]

@@ -18,7 +18,8 @@ use areograph_stages::{
 
 pub(super) static DOCUMENT: Declaration<WriteArchive> = Declaration {
     path: "archive.json",
-    what: "verdict, limits, files with their problems, statistics by off-nadir angle, position errors",
+    what: "verdict, limits, files with their problems, statistics by off-nadir angle, and interpolation errors of \
+           positions",
     readers: "scripts",
     rows: "files",
     role: Role::Metadata,
@@ -100,13 +101,13 @@ struct FileDocument<'a> {
     records: u64,
     /// Profiles.
     profiles: usize,
-    /// Shots that were checked.
+    /// Number of shots that were checked.
     shots: u64,
     /// Number of shots without a spacecraft position in the kernels.
     not_covered: u64,
     /// Number of problems in the records and the label.
     complaint_count: u64,
-    /// First problems in records and label.
+    /// First problems in the records and the label.
     complaints: &'a [String],
 }
 

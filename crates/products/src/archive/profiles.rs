@@ -77,19 +77,19 @@ fn times<'a>() -> Vec<Column<&'a ArchiveProfile>> {
         column(
             "part",
             Unit::None,
-            "number of the part, from 1; a new part starts after a pause of more than 300 s",
+            "number of the part of the orbit, counted from 1; a new part starts after a pause of more than 300 s",
             |row: &Row| row.part,
         ),
         column(
             "first_record",
             Unit::None,
-            "number of the first record with a selected shot, from 1, label included",
+            "number of the first record with a selected shot, counted from 1, label records included",
             |row: &Row| row.first_record,
         ),
         column(
             "last_record",
             Unit::None,
-            "number of the last record with a selected shot, from 1, label included",
+            "number of the last record with a selected shot, counted from 1, label records included",
             |row: &Row| row.last_record,
         ),
         column(
@@ -137,7 +137,8 @@ fn ranges<'a>() -> Vec<Column<&'a ArchiveProfile>> {
         checked(
             "mean_m",
             Unit::Metre,
-            "mean of range minus distance between spacecraft (kernels) and raw footprint; missing where no shot was checked",
+            "mean of range minus distance from the spacecraft (kernels) to the footprint (raw radius); missing where \
+             no shot was checked",
             |row| row.range_minus_distance_m.mean,
         ),
         checked(
@@ -179,19 +180,19 @@ fn ranges<'a>() -> Vec<Column<&'a ArchiveProfile>> {
         column(
             "outliers",
             Unit::None,
-            "shots more than 5 NMAD from the median",
+            "shots more than 5 NMAD (and more than 0.05 m) from the median",
             |row: &Row| row.outliers,
         ),
         checked(
             "crossover_mean_m",
             Unit::Metre,
-            "mean of range minus distance between spacecraft (kernels) and crossover-corrected footprint",
+            "mean of range minus distance from the spacecraft (kernels) to the footprint (crossover-corrected radius)",
             |row| row.crossover_mean_m,
         ),
         checked(
             "decoding_mean_m",
             Unit::Metre,
-            "mean of range minus distance between spacecraft (PEDR file) and raw footprint",
+            "mean of range minus distance from the spacecraft (PEDR file) to the footprint (raw radius)",
             |row| row.decoding_mean_m,
         ),
         checked(
@@ -209,20 +210,19 @@ fn orbits<'a>() -> Vec<Column<&'a ArchiveProfile>> {
         checked(
             "spacecraft_radial_m",
             Unit::Metre,
-            "mean spacecraft position (PEDR file) minus spacecraft position (kernels), away from Mars",
+            "mean difference of spacecraft positions, PEDR file minus kernels, away from Mars",
             |row| row.spacecraft_m[0],
         ),
         checked(
             "spacecraft_along_m",
             Unit::Metre,
-            "mean spacecraft position (PEDR file) minus spacecraft position (kernels), along the flight",
+            "mean difference of spacecraft positions, PEDR file minus kernels, along the flight",
             |row| row.spacecraft_m[1],
         ),
         checked(
             "spacecraft_cross_m",
             Unit::Metre,
-            "mean spacecraft position (PEDR file) minus spacecraft position (kernels), along the orbital angular \
-             momentum",
+            "mean difference of spacecraft positions, PEDR file minus kernels, along the orbital angular momentum",
             |row| row.spacecraft_m[2],
         ),
         column(
@@ -240,7 +240,8 @@ fn orbits<'a>() -> Vec<Column<&'a ArchiveProfile>> {
         column(
             "best_correction_radius",
             Unit::None,
-            "footprint radius that gives the smallest spread: raw or crossover-corrected",
+            "footprint radius used for best_correction_s: crossover (corrected radius, used if it reduces the least \
+             spread by more than 2 %) or raw",
             |row: &Row| {
                 let word = row.best_correction_s.map(|_| row.correction_radius.word());
                 word.unwrap_or_default().to_owned()
@@ -249,7 +250,8 @@ fn orbits<'a>() -> Vec<Column<&'a ArchiveProfile>> {
         column(
             "share_of_limits",
             Unit::None,
-            "largest ratio of a checked value to its limit: above 1, a limit is exceeded; missing if too few shots were checked",
+            "largest ratio of a checked value to its limit; above 1 if a limit is exceeded; missing if too few shots \
+             were checked",
             |row: &Row| row.share_of_limits,
         ),
         column(

@@ -22,7 +22,7 @@ type WriteShots = fn(&Path, &ArchiveProfile, &[CheckedShot]) -> Result<u64>;
 
 pub(super) static SHOTS: Declaration<WriteShots> = Declaration {
     path: "shots/<profile>.parquet",
-    what: "every checked shot of a profile with its residuals; one file for each of the worst profiles",
+    what: "every selected shot of a profile with its residuals; one file for each of the worst profiles",
     readers: "scripts",
     rows: "shots",
     role: Role::Data,
@@ -76,7 +76,7 @@ fn columns() -> Vec<Column<CheckedShot>> {
         column(
             "record",
             Unit::None,
-            "number of the record in the file, from 1, label included",
+            "number of the record in the file, counted from 1, label records included",
             |row: &Row| row.record,
         ),
         column(
@@ -118,38 +118,39 @@ fn columns() -> Vec<Column<CheckedShot>> {
         column(
             "range_minus_distance_m",
             Unit::Metre,
-            "range minus distance between spacecraft (kernels) and raw footprint; missing where the kernels contain no position",
+            "range minus distance from the spacecraft (kernels) to the footprint (raw radius); missing where the \
+             kernels contain no position",
             |row: &Row| Some(row.residuals?.range_minus_distance_m),
         ),
         column(
             "range_minus_distance_crossover_m",
             Unit::Metre,
-            "range minus distance between spacecraft (kernels) and crossover-corrected footprint; missing where the \
-             kernels contain no position",
+            "range minus distance from the spacecraft (kernels) to the footprint (crossover-corrected radius); \
+             missing where the kernels contain no position",
             |row: &Row| Some(row.residuals?.range_minus_distance_crossover_m),
         ),
         column(
             "decoding_m",
             Unit::Metre,
-            "range minus distance between spacecraft (PEDR file) and raw footprint",
+            "range minus distance from the spacecraft (PEDR file) to the footprint (raw radius)",
             |row: &Row| Some(row.residuals?.decoding_m),
         ),
         column(
             "spacecraft_radial_m",
             Unit::Metre,
-            "spacecraft position (PEDR file) minus spacecraft position (kernels), away from Mars",
+            "difference of spacecraft positions, PEDR file minus kernels, away from Mars",
             |row: &Row| Some(row.residuals?.spacecraft_m.x),
         ),
         column(
             "spacecraft_along_m",
             Unit::Metre,
-            "spacecraft position (PEDR file) minus spacecraft position (kernels), along the flight",
+            "difference of spacecraft positions, PEDR file minus kernels, along the flight",
             |row: &Row| Some(row.residuals?.spacecraft_m.y),
         ),
         column(
             "spacecraft_cross_m",
             Unit::Metre,
-            "spacecraft position (PEDR file) minus spacecraft position (kernels), along the orbital angular momentum",
+            "difference of spacecraft positions, PEDR file minus kernels, along the orbital angular momentum",
             |row: &Row| Some(row.residuals?.spacecraft_m.z),
         ),
     ]

@@ -22,8 +22,8 @@ use areograph_stages::{
 
 pub(super) static DOCUMENT: Declaration<WriteCalibration> = Declaration {
     path: "calibration.json",
-    what: "parameters with standard deviations, combinations that tie points do not determine, statistics after \
-           every step, for withheld control and for other orbits, verdict",
+    what: "parameters with standard deviations; combinations that tie points do not determine; statistics after every \
+           step, for withheld control and for other orbits; verdict",
     readers: "scripts",
     rows: "cameras",
     role: Role::Metadata,
@@ -49,19 +49,19 @@ struct Document<'a> {
     calibration: &'a str,
     /// The body that the camera observes, as named in `config/bodies`.
     body: &'static str,
-    /// Unknowns estimated from tie points before control is used.
+    /// Parameters estimated from tie points before control is used.
     mode: CalibrationMode,
     /// Whether the result is usable.
     verdict: &'a Verdict,
     /// The lines of the camera.
     #[schemars(length(min = 2))]
     cameras: Vec<CameraDocument<'a>>,
-    /// Drift of the orbit, body-fixed, metres per image line: true minus given support data. The
-    /// offset angles absorb the constant part of the orbit error.
+    /// Drift of the orbit, body-fixed, metres per image line: estimated true orbit minus orbit in the given support
+    /// data. The offset angles absorb the constant part of the orbit error.
     drift_m_per_line: [Value; 3],
     /// Offset angles determined from tie points only.
     tie_sight: TieSightDocument,
-    /// Test of tie point heights against the ground between laser points; absent if none could be tested.
+    /// Test of the heights of tie points against the ground between laser points; absent if none could be tested.
     #[serde(skip_serializing_if = "Option::is_none")]
     tie_ground: Option<TieGround>,
     /// Statistics before the first step, and after every step.
@@ -73,7 +73,7 @@ struct Document<'a> {
     /// Results for withheld control; absent without control.
     #[serde(skip_serializing_if = "Option::is_none")]
     held_back: Option<&'a HeldBack>,
-    /// Residuals of the used control, divided by their expected size.
+    /// Root mean square residuals of the control used, divided by their expected values.
     #[serde(skip_serializing_if = "Option::is_none")]
     control_scatter: Option<Scatter>,
     /// Other orbits.
@@ -83,7 +83,7 @@ struct Document<'a> {
 /// A calibration in rounds.
 #[derive(Serialize, JsonSchema)]
 struct RoundsDocument {
-    /// Whether the rounds converged: half of the units shifted by less than half a cell, and control residuals
+    /// Whether the rounds converged: the median shift of the units was less than half a cell, and control residuals
     /// changed by less than 2 %.
     converged: bool,
     /// Maximum number of rounds.
@@ -94,7 +94,8 @@ struct RoundsDocument {
     rounds: Vec<RoundDocument>,
 }
 
-/// Statistics of a round: terrain model and units with the cameras of the preceding round, then the cameras.
+/// Statistics of a round: terrain model and units with the cameras of the preceding round, then the cameras of this
+/// round.
 #[derive(Serialize, JsonSchema)]
 struct RoundDocument {
     /// From 1.
@@ -109,13 +110,13 @@ struct RoundDocument {
     tie_rms_px: Option<f64>,
     /// Share of terrain model cells with a height.
     model_filled: f64,
-    /// Kept units of shots for the calibration.
+    /// Number of kept units of shots for the calibration.
     units_kept: u64,
-    /// Rejected units of shots for the calibration.
+    /// Number of rejected units of shots for the calibration.
     units_refused: u64,
-    /// Kept units of shots withheld for validation.
+    /// Number of kept units of shots withheld for validation.
     judging_kept: u64,
-    /// Rejected units of shots withheld for validation.
+    /// Number of rejected units of shots withheld for validation.
     judging_refused: u64,
     /// Median length of the shifts of kept calibration units, cells; absent if no unit was kept.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -127,7 +128,7 @@ struct RoundDocument {
     control: PixelsAndMetres,
     /// Root mean square of the withheld-control residuals over all camera lines.
     held_back: PixelsAndMetres,
-    /// Residuals of withheld control, divided by their expected size.
+    /// Root mean square residuals of withheld control, divided by their expected values.
     #[serde(skip_serializing_if = "Option::is_none")]
     held_back_scatter: Option<Scatter>,
     /// φ, ω and κ of every line, degrees, in the order of `cameras`.
@@ -147,8 +148,8 @@ struct CameraDocument<'a> {
     omega_deg: Value,
     /// κ, rotation about the downward axis (yaw), degrees.
     kappa_deg: Value,
-    /// Look-angle tangent across the flight: coefficients of the powers of s′, from −1 at the first edge of the image
-    /// to 1 at the last.
+    /// Look-angle tangent across the flight: coefficients of the powers of s′, which increases from −1 at the first
+    /// edge of the image to 1 at the last.
     m: &'a [Value],
     /// Look-angle tangent along the flight: coefficients of the powers of s′.
     n: &'a [Value],
@@ -175,7 +176,7 @@ struct CameraDocument<'a> {
 struct TieSightDocument {
     /// Number of directions that tie points do not determine (standard deviation above one degree).
     unseen: u32,
-    /// Names of these.
+    /// Names of these directions.
     unseen_directions: Vec<String>,
     /// Orthonormal directions, starting with the least determined direction.
     directions: Vec<DirectionDocument>,

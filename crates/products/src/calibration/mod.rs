@@ -70,7 +70,7 @@ pub(super) fn group() -> Group {
         heading: "Calibrations of the lines of a camera",
         source: "`areograph calibrate`, in the folder of the calibration",
         prefix: "calibration",
-        placeholders: ", `<camera>` stands for a line of the camera",
+        placeholders: "; `<camera>` stands for a line of the camera",
         products: [described(&[&CAMERA_SUPPORT]), described(PRODUCTS)].concat(),
     }
 }

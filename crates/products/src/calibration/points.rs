@@ -88,20 +88,20 @@ fn sigmas<'a>() -> [Column<Row<'a>>; 3] {
         column(
             "sigma_east_m",
             Unit::Metre,
-            "east standard deviation from measurement and calibration, metres; empty for a tie point if its height is not \
-             tested for the errors found at other points",
+            "standard deviation in east from measurement and calibration, metres; empty for a tie point whose height \
+             test cannot detect errors of the usual size",
             |row: &Row| row.sigma_m.map(|sigma_m| sigma_m[0]),
         ),
         column(
             "sigma_north_m",
             Unit::Metre,
-            "north standard deviation from measurement and calibration, metres; empty where sigma_east_m is empty",
+            "standard deviation in north from measurement and calibration, metres; empty where sigma_east_m is empty",
             |row: &Row| row.sigma_m.map(|sigma_m| sigma_m[1]),
         ),
         column(
             "sigma_up_m",
             Unit::Metre,
-            "up standard deviation from measurement and calibration, metres; empty where \
+            "standard deviation of the height from measurement and calibration, metres; empty where \
              sigma_east_m is empty",
             |row: &Row| row.sigma_m.map(|sigma_m| sigma_m[2]),
         ),

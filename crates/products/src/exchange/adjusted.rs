@@ -25,7 +25,8 @@ use areograph_stages::{
 
 pub(crate) static LIDAR: Declaration = Declaration {
     path: "exchange/lidar.json",
-    what: "shots with ranges for ISIS: a priori and adjusted points, with their coordinates in the adjusted images",
+    what: "shots with ranges for ISIS: a priori and adjusted points, with image coordinates by the adjusted \
+           orientation",
     readers: "ISIS",
     rows: "shots",
     role: Role::Data,

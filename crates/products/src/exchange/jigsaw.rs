@@ -78,7 +78,8 @@ pub(crate) static RESIDUALS: Declaration = Declaration {
 
 pub(crate) static POINTS: Declaration = Declaration {
     path: "exchange/bundleout_points.csv",
-    what: "adjusted tie points in jigsaw's format; latitude, longitude and radius in metres are north, east and up",
+    what: "adjusted tie points in jigsaw's format; in columns in metres, latitude, longitude and radius are north, \
+           east and up",
     readers: "users of jigsaw",
     rows: "tie points",
     role: Role::Data,
@@ -92,9 +93,9 @@ pub(crate) static POINTS: Declaration = Declaration {
 
 pub(crate) static IMAGES: Declaration = Declaration {
     path: "exchange/bundleout_images.csv",
-    what: "orientation corrections in jigsaw's format, over existing kernels as ISIS reads them (light time to the centre \
-           of {body}): kilometres and degrees for powers of t, which is 0 in the middle of the image and 1 at its end; \
-           rotations about the camera axes",
+    what: "orientation corrections in jigsaw's format, relative to the original kernels as ISIS reads them (light \
+           time to the centre of {body}): kilometres and degrees for powers of t, which is 0 in the middle of the \
+           image and 1 at its end; rotations about the camera axes",
 
     readers: "users of jigsaw",
     rows: "images",

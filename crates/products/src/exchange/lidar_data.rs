@@ -82,7 +82,8 @@ struct SharedError<'a> {
     adjusted_sigma_east_north_up: [f64; 3],
 }
 
-const SHARED: &str = "metres; all points of the profile share this shift, which does not average out; their matrices include it";
+const SHARED: &str = "standard deviations, metres, of a shift that all points of the profile share and that does not \
+                      average out; the matrices of the points include its uncertainty";
 
 /// Members in the order of ISIS, which is alphabetical.
 #[derive(Serialize)]

@@ -58,12 +58,12 @@ pub(super) fn shared_in_words(sigma_m: Option<[f64; 3]>) -> String {
         || "the error of the a priori orientations".to_owned(),
         |[east_m, north_m, up_m]| {
             format!(
-                "an error of {east_m:.1} m east, {north_m:.1} m north and {up_m:.1} m up (standard deviations)"
+                "an error with standard deviations of {east_m:.1} m east, {north_m:.1} m north and {up_m:.1} m up"
             )
         },
     );
     format!(
-        "all points share {size}: the standard deviations contain this error, which does not average out"
+        "all points share {size}; the standard deviations of the points contain this error, which does not average out"
     )
 }
 

@@ -108,8 +108,9 @@ fn light_time(site: &SiteProducts) -> String {
 const ADJUSTED: &str = "\
     Adjusted rays are the same in both conventions: points, networks, ground control, residuals and\n\
     ../images/<image>/adjusted_isd.json suit every program, and only the adjusted kernels depend on the program that reads\n\
-    them. Ranges of lidar data are geometric: with the adjusted kernels in centre/, the ranges that jigsaw computes agree to\n\
-    0.2 m; with the original kernels they differ by up to 330 m.\n\n";
+    them. Ranges of lidar data are geometric: with the adjusted kernels in centre/, the ranges that jigsaw computes \
+    agree\n\
+    within 0.2 m; with the original kernels, they differ by up to 330 m.\n\n";
 
 /// Files written and not empty, each file of images once, and files to be written: those declared after this text.
 fn files(of: &Context) -> Vec<&'static Declaration> {
@@ -156,8 +157,9 @@ fn about(program: Program, terms: &Terms<'_>) -> String {
     match program {
         Program::StereoPipeline => format!(
             "\
-            Ames Stereo Pipeline ({} is a sphere of {} m). Tables contain radii instead of heights: the\n\
-            choice of a datum does not matter. The .json file of a table states its columns, --csv-format and\n\
+            Ames Stereo Pipeline ({} is a sphere of {} m). Tables contain radii instead of heights, so\n\
+            that the choice of a datum does not matter. The .json file of a table states its columns, --csv-format \
+            and\n\
             radii. The first line of a table names the columns.",
             body.map().asp_datum,
             body.map().radius_m
@@ -173,7 +175,8 @@ fn about(program: Program, terms: &Terms<'_>) -> String {
         ),
         Program::CameraModel => "\
             Community Sensor Model (usgscsm): image support data of the cameras. These data differ from the\n\
-            ALE files where the latter do not describe the camera: the time of a line includes the summing, samples\n\
+            ALE files where the latter describe the camera incorrectly: the time of a line includes the summing, \
+            samples\n\
             and the detector's centre count from the detector's edge, there is no distortion, and the pointing covers\n\
             the whole image. The member areograph.interpolation states the measured interpolation error. The models\n\
             in centre/ follow the light-time convention of ISIS and ALE."

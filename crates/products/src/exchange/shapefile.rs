@@ -44,7 +44,8 @@ pub(crate) static POINTS: Declaration = Declaration {
     }),
     uses: &[Use {
         program: Program::Gis,
-        lines: "ogrinfo -al -so footprints.shp                   3-D shapefile; names of at most ten letters, no windows",
+        lines: "ogrinfo -al -so footprints.shp                   3-D shapefile; column names of at most ten letters, \
+                no windows",
     }],
 };
 

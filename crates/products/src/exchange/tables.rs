@@ -20,7 +20,8 @@ use areograph_config::ShotFormat;
 
 pub(crate) static LOLA_LIKE: Declaration = Declaration {
     path: "exchange/lola_like.csv",
-    what: "footprints as LOLA's reduced data records: UTC, longitude, latitude, radius in km, range in km, ...",
+    what: "footprints in the format of LOLA's reduced data records: UTC, longitude, latitude, radius in km, range in \
+           km, ...",
     readers: "ISIS, Ames Stereo Pipeline",
     rows: "shots",
     role: Role::Data,
@@ -39,7 +40,7 @@ pub(crate) static LOLA_LIKE: Declaration = Declaration {
             lines: "lrolola2isis from=lola_like.csv cubes=cubes.lis pointid={altimeter}???? to=lidar.json\n\
                     # Lidar points of ISIS need the line and sample at which each image sees the shot, which lrolola2isis\n\
                     # computes (lidar.json contains both for a site with tie points). The program reads column 4, the radius\n\
-                    # after the crossover correction; the range of column 5 belongs to column 6, the radius before the\n\
+                    # after the crossover correction; the range in column 5 refers to column 6, the radius before the\n\
                     # correction. For range constraints, first exchange columns 4 and 6:\n\
                     awk -F, -v OFS=, '{ t = $4; $4 = $6; $6 = t; print }' lola_like.csv > lola_raw.csv",
         },
@@ -104,8 +105,8 @@ pub(crate) static ODE_SIDECAR: Declaration = Declaration {
 };
 
 const LOLA_LIKE_RADIUS: &str = "column 4, for heights, is the distance from the centre of {body} after the crossover correction, \
-     kilometres; column 6, for range constraints, is this distance before the correction, to which the range of column 5 \
-     belongs; no column is a height";
+     kilometres; column 6, for range constraints, is this distance before the correction, to which the range in \
+     column 5 refers; no column contains heights";
 const ODE_RADIUS: &str = "column 5 is the distance from the centre of {body} after the crossover correction, metres; \
      column 3 is this distance minus the radius of the {areoid}, not a height above a sphere";
 

@@ -56,9 +56,11 @@ fn identity<'a>() -> Vec<Column<Shot<'a>>> {
         )
         .in_gis()
         .in_dbase("orbit", 10, 0),
-        text_column("source_file", "{shot_file}", |shot: &Shot, out| {
-            out.write_str(shot.file_name())
-        })
+        text_column(
+            "source_file",
+            "name of the {shot_file}",
+            |shot: &Shot, out| out.write_str(shot.file_name()),
+        )
         .in_gis()
         .in_dbase("file", 0, 0),
         column("record", Unit::None, "{record}", |shot: &Shot| {
@@ -93,7 +95,7 @@ fn quality<'a>() -> Vec<Column<Shot<'a>>> {
         column(
             "attitude_flag",
             Unit::None,
-            "attitude: 0 known, 2 known for part of the frame, 3 unknown",
+            "knowledge of the attitude: 0 known, 2 known for part of the frame, 3 unknown",
             |shot: &Shot| u32::from(shot.get(|footprints| &footprints.attitude_flag)),
         ),
         column(
@@ -131,7 +133,7 @@ fn ground<'a>() -> Vec<Column<Shot<'a>>> {
         column(
             "latitude_areographic_deg",
             Unit::Degree,
-            "{latitude_of_maps} latitude, degrees, {frame} radii; convention of older maps",
+            "{latitude_of_maps} latitude on the ellipsoid of {frame}, degrees; convention of older maps",
             Shot::areographic_deg,
         ),
     ]
@@ -165,7 +167,7 @@ fn heights<'a>() -> Vec<Column<Shot<'a>>> {
         column(
             "topography_m",
             Unit::Metre,
-            "radius after the crossover correction minus the radius of the {areoid}, metres",
+            "planetary radius after the crossover correction minus the radius of the {areoid}, metres",
             Shot::topography_m,
         )
         .in_gis()
@@ -228,8 +230,8 @@ fn spacecraft<'a>() -> Vec<Column<Shot<'a>>> {
         column(
             "nadir_by_range",
             Unit::None,
-            "whether the file lacks spacecraft positions: the position is then on the radius through the footprint, at \
-             range_m",
+            "whether the file states no spacecraft position, which is then set on the radius through the footprint at \
+             the distance range_m",
             |shot: &Shot| !states_spacecraft(shot.footprints, shot.row),
         ),
     ]

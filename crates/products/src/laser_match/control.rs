@@ -83,13 +83,14 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
         column(
             "sigma_matching_horizontal_m",
             Unit::Metre,
-            "standard deviation of a horizontal coordinate from the matching, metres; calibrations add the laser's own error",
+            "standard deviation from the matching of a horizontal coordinate, root mean square of east and north, \
+             metres; calibrations add the laser's own error",
             |row: &Row| row.point.sigma_horizontal_m(),
         ),
         column(
             "sigma_matching_vertical_m",
             Unit::Metre,
-            "standard deviation of the radius from the matching, metres; calibrations add the laser's own error",
+            "standard deviation from the matching of the radius, metres; calibrations add the laser's own error",
             |row: &Row| row.point.sigma_m[2],
         ),
     ]

@@ -23,7 +23,7 @@ pub(super) static TABLE: Declaration<WriteMatch> = Declaration {
 
 pub(super) static CSV: Declaration<WriteMatch> = Declaration {
     path: "control_points.csv",
-    what: "laser control points of the units, as CSV",
+    what: "laser control points of the kept units, as CSV",
     readers: "spreadsheets, scripts",
     rows: "points",
     role: Role::Data,
@@ -43,7 +43,8 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
         column(
             "point",
             Unit::None,
-            "PEDR file, record and number of the used shot of the unit that is nearest to the bias",
+            "PEDR file, record and number of the used shot of the unit whose height residual is closest to the unit's \
+             bias",
             |row: &Row| row.name.clone(),
         ),
         column("unit", Unit::None, "number of the unit", |row: &Row| {
@@ -82,7 +83,7 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
         column(
             "model_radius_m",
             Unit::Metre,
-            "distance of the terrain model from the centre of Mars at this point, metres",
+            "distance of the terrain model from the centre of Mars at the shifted position, metres",
             |row: &Row| row.model[2],
         ),
         column(

@@ -12,8 +12,8 @@ use areograph_stages::match_laser::UnitResult;
 
 pub(super) static TABLE: Declaration<WriteMatch> = Declaration {
     path: "units.parquet",
-    what: "units of laser shots: shift, validation by withheld shots, and whether the unit is kept, or else the \
-        reason",
+    what: "units of laser shots: shift, validation by withheld shots, and the reason for rejection of units that are \
+           not kept",
     readers: "scripts",
     rows: "units",
     role: Role::Data,
@@ -138,20 +138,22 @@ fn deviations<'a>() -> [Column<Row<'a>>; 3] {
         column(
             "sigma_east_m",
             Unit::Metre,
-            "standard deviation of the eastward shift, from the omission of single shots and the scatter of all units, metres",
+            "standard deviation of the eastward shift, from the omission of single shots, scaled by the scatter of \
+             all units, metres",
             |row: &Row| row.found.and_then(|found| Some(found.sigma?.shift_m[0])),
         ),
         column(
             "sigma_north_m",
             Unit::Metre,
-            "standard deviation of the northward shift, from the omission of single shots and the scatter of all units, \
-             metres",
+            "standard deviation of the northward shift, from the omission of single shots, scaled by the scatter of \
+             all units, metres",
             |row: &Row| row.found.and_then(|found| Some(found.sigma?.shift_m[1])),
         ),
         column(
             "sigma_bias_m",
             Unit::Metre,
-            "standard deviation of `bias_m`, from the omission of single shots and the scatter of all units, metres",
+            "standard deviation of `bias_m`, from the omission of single shots, scaled by the scatter of all units, \
+             metres",
             |row: &Row| row.found.and_then(|found| Some(found.sigma?.bias_m)),
         ),
     ]
@@ -162,39 +164,39 @@ fn judged<'a>() -> [Column<Row<'a>>; 7] {
         column(
             "score",
             Unit::None,
-            "similarity at the best whole-cell shift, by the measure stated on the page",
+            "similarity at the best whole-cell shift, by the measure that the report states",
             |row: &Row| row.found.map(|found| found.score),
         ),
         column(
             "contrast",
             Unit::None,
-            "ratio of the best similarity to the mean of all similarities above 0",
+            "ratio of the best similarity to the mean of all positive similarities",
             |row: &Row| row.found.map(|found| found.contrast),
         ),
         column(
             "bias_m",
             Unit::Metre,
-            "mean of model minus laser with the shift, over the used shots, metres",
+            "mean height difference of the shifted model and the laser, model minus laser, over the used shots, metres",
             |row: &Row| row.found.map(|found| found.bias_m),
         ),
         column(
             "held_out_shots",
             Unit::None,
-            "number of shots withheld from the search; 0 if the model has too few heights for them",
+            "number of shots withheld from the search; 0 if the model has too few heights at these shots",
             |row: &Row| row.held_out.map_or(0, |held_out| natural(held_out.shots)),
         ),
         column(
             "held_out_before_m",
             Unit::Metre,
-            "root mean square of model minus laser at the withheld shots without the shift, about the bias of the used \
-             shots, metres",
+            "root mean square of model minus laser heights at the withheld shots without the shift, about the bias of \
+             the used shots, metres",
             |row: &Row| row.held_out.map(|held_out| held_out.before_m),
         ),
         column(
             "held_out_after_m",
             Unit::Metre,
-            "root mean square of model minus laser at the withheld shots with the shift, about the bias of the used \
-             shots, metres",
+            "root mean square of model minus laser heights at the withheld shots with the shift, about the bias of \
+             the used shots, metres",
             |row: &Row| row.held_out.map(|held_out| held_out.after_m),
         ),
         column(

@@ -66,13 +66,13 @@ fn columns<'a>() -> Vec<Column<&'a ControlResult>> {
         column(
             "scale_dx_m",
             Unit::Metre,
-            "given minus computed east coordinate by SCALE of the free figure, metres; used to detect gross errors",
+            "given minus computed east coordinate, from SCALE of the free figure, metres; used to detect gross errors",
             |row: &Row| row.scale_residual_m[0],
         ),
         column(
             "scale_dy_m",
             Unit::Metre,
-            "given minus computed north coordinate by SCALE of the free figure, metres; \
+            "given minus computed north coordinate, from SCALE of the free figure, metres; \
             used to detect gross errors",
             |row: &Row| row.scale_residual_m[1],
         ),

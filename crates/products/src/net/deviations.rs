@@ -47,14 +47,15 @@ fn columns<'a>() -> Vec<Column<&'a MeasurementResult>> {
         column(
             "brick_dx_m",
             Unit::Metre,
-            "east deviation within the brick: image minus mean of the point, metres; missing if the brick has one image",
+            "east deviation within the brick: image minus mean of the point, metres; missing if the point is on one \
+             picture of the brick",
             |row: &Row| Some(row.in_brick?.x_m),
         ),
         column(
             "brick_dy_m",
             Unit::Metre,
-            "north deviation within the brick: image minus mean of the point, metres; missing if \
-            the brick has one image",
+            "north deviation within the brick: image minus mean of the point, metres; missing if the point is on one \
+             picture of the brick",
             |row: &Row| Some(row.in_brick?.y_m),
         ),
         column(
@@ -72,13 +73,13 @@ fn columns<'a>() -> Vec<Column<&'a MeasurementResult>> {
         column(
             "redundancy",
             Unit::None,
-            "fraction of a measurement error that appears in the deviation, 0 to 1",
+            "redundancy number: share of a measurement error that appears in the deviation, 0 to 1",
             |row: &Row| row.redundancy,
         ),
         column(
             "flagged",
             Unit::None,
-            "whether the deviation exceeds 3.5 robust standard deviations of its brick",
+            "whether the deviation exceeds 3.5 robust standard deviations of the deviations in its brick",
             |row: &Row| row.flagged,
         ),
         column(

@@ -40,9 +40,12 @@ fn columns<'a>() -> Vec<Column<&'a PictureResult>> {
         column("picture", Unit::None, "name of the picture", |row: &Row| {
             row.picture.clone()
         }),
-        column("brick", Unit::None, "name of its brick", |row: &Row| {
-            row.brick.clone()
-        }),
+        column(
+            "brick",
+            Unit::None,
+            "name of the brick that contains the picture",
+            |row: &Row| row.brick.clone(),
+        ),
         column(
             "p",
             Unit::None,
@@ -73,7 +76,7 @@ fn columns<'a>() -> Vec<Column<&'a PictureResult>> {
         column(
             "sigma_scale",
             Unit::None,
-            "standard deviation of the scale, as a fraction of the scale, and of the angle, radians",
+            "standard deviation of the scale (as a fraction of the scale), equal to that of the angle (radians)",
             |row: &Row| row.sigma_scale,
         ),
         column(
@@ -115,7 +118,7 @@ fn columns<'a>() -> Vec<Column<&'a PictureResult>> {
         column(
             "deviation_rms_m",
             Unit::Metre,
-            "root mean square deviation, per coordinate, of the picture's points from their means, metres",
+            "root mean square, per coordinate, of the deviations of the picture's ties from their means, metres",
             |row: &Row| row.deviation_rms_m,
         ),
         column(

@@ -132,7 +132,7 @@ fn columns<'a>() -> Vec<Column<&'a PointResult>> {
         column(
             "sigma_m",
             Unit::Metre,
-            "standard deviation of x_m and of y_m, metres on the map; missing where undetermined",
+            "standard deviation of x_m and of y_m, metres on the map; missing if it is not determined",
             |row: &&PointResult| row.sigma_m,
         )
         .in_gis(),

@@ -22,7 +22,7 @@ use areograph_base::error::Cause;
 
 /// A complete product, but not in the form that this version writes.
 #[derive(Debug, thiserror::Error, Cause)]
-#[cause(Input: "regenerate products of another version of areograph with this version")]
+#[cause(Input: "if another version of areograph wrote the products, regenerate them with this version")]
 pub(super) enum ReadError {
     /// Not Parquet, or not the document.
     #[error("cannot be read as {what}: {reason}")]

@@ -37,8 +37,8 @@ def fetch(
     Returns
     -------
     pandas.DataFrame
-        ``kind``, ``file``, ``url``, ``bytes``, ``md5``, ``status`` and ``why`` of every file. A file that failed has a
-        status that begins with ``failed``. ``attrs["areograph"]["notes"]`` lists needs that no archive meets.
+        ``kind``, ``file``, ``url``, ``bytes``, ``md5``, ``status`` and ``why`` of every file. The status of a file that
+        could not be fetched begins with ``failed``. ``attrs["areograph"]["notes"]`` lists needs that no archive meets.
     """
     pandas = optional("pandas")
     rows, notes = _native.fetch(

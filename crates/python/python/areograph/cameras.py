@@ -1,4 +1,4 @@
-"""Cameras of line scanners: support data, orientation, and the two directions between image and ground."""
+"""Pushbroom cameras: support data, orientation, and projection from the ground to the image and back."""
 
 from __future__ import annotations
 
@@ -46,7 +46,8 @@ def load(label: StrPath, kernels: Paths | None = None, *, format: str = "isd") -
     -------
     dict
         Support data as ``usgscsm`` reads them, the file ``isd.json`` of a run. They state the pointing bias and the
-        light-time convention; see the guide for the differences from ALE. The identifier is the product identifier in the label.
+        light-time convention; see the guide for the differences from ALE. The identifier is the product identifier in
+        the label.
 
     Raises
     ------
@@ -107,9 +108,8 @@ def orientation(image: Image, kernels: Paths | None = None, *, step_lines: float
     -------
     xarray.Dataset
         ``position_m`` (``line``, ``xyz``): perspective centre, body-fixed, in the light-time convention of the support
-        data; ``quaternion`` (``line``, ``wxyz``): rotation
-        from the axes of the camera to those of the body; coordinates ``line`` (0 at the outer edge of the first line)
-        and ``et_s``.
+        data; ``quaternion`` (``line``, ``wxyz``): rotation from the axes of the camera to those of the body;
+        coordinates ``line`` (0 at the outer edge of the first line) and ``et_s``.
     """
     xarray = optional("xarray")
     if not step_lines > 0.0:
@@ -141,7 +141,7 @@ def orientation(image: Image, kernels: Paths | None = None, *, step_lines: float
 def ground_to_image(
     image: Image, longitude_deg: Any, latitude_deg: Any, radius_m: Any
 ) -> tuple[Numbers, Numbers, NDArray[numpy.bool_]]:
-    """Find the line and sample that see points on the ground.
+    """Find the lines and samples at which an image shows points on the ground.
 
     Parameters
     ----------
@@ -155,7 +155,8 @@ def ground_to_image(
     -------
     line, sample, valid
         Lines and samples are 0 at the outer edge of the first line or sample. ``valid`` states whether the image shows
-        the point. The result is NaN for a point that no line sees: behind the camera, on the far side of the body, or without a position. Occlusion by terrain is not examined.
+        the point. Line and sample are NaN for a point that no line sees: behind the camera, on the far side of the
+        body, or with invalid coordinates. Occlusion by terrain is not examined.
     """
     points, shape = _broadcast(longitude_deg=longitude_deg, latitude_deg=latitude_deg, radius_m=radius_m)
     table = pyarrow.table(_camera(_support(image)).project(*points))
@@ -181,8 +182,8 @@ def image_to_ground(
     line, sample
         Positions, 0 at the outer edge of the first line or sample; numbers or arrays of one shape.
     surface
-        The ground: a radius in metres, or a function that returns radii in metres at arrays of longitudes (0 to 360) and
-        latitudes in degrees, which are NaN for positions outside the image. By default the ellipsoid of the body.
+        The ground: a radius in metres, or a function that returns radii in metres for arrays of longitudes (0 to 360)
+        and latitudes in degrees; these are NaN for positions outside the image. By default the ellipsoid of the body.
 
     Returns
     -------
@@ -214,7 +215,8 @@ def _on_surface(
     for _ in range(_ITERATIONS):
         radii_m = column(surface(longitude_deg, latitude_deg), "the result of surface")
         if len(radii_m) not in (1, len(radius_m)):
-            raise UsageError(f"surface returned {len(radii_m)} radii for {len(radius_m)} places; expected as many")
+            expected = f"1, or one for each of {len(radius_m)} places"
+            raise UsageError(f"surface returned {len(radii_m)} radii; expected {expected}")
         surface_m = numpy.ascontiguousarray(numpy.broadcast_to(radii_m, radius_m.shape))
         # A place outside the surface keeps NaN from here on.
         change_m = numpy.abs(surface_m - radius_m)

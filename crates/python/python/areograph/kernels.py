@@ -26,7 +26,7 @@ def spacecraft_state(et: Any, kernels: Paths, *, frame: str = "IAU_MARS") -> Dat
     Parameters
     ----------
     et
-        TDB seconds past J2000, or UTC as text or datetime: one or an array.
+        TDB seconds past J2000, or UTC as text or datetime: a single value or an array.
     kernels
         A metakernel (``.tm``), or kernels in load order.
     frame
@@ -36,7 +36,8 @@ def spacecraft_state(et: Any, kernels: Paths, *, frame: str = "IAU_MARS") -> Dat
     Returns
     -------
     xarray.Dataset
-        ``position_m`` and ``velocity_m_s`` with dimensions ``et`` and ``xyz``; coordinates ``et`` (seconds) and ``utc``.
+        ``position_m`` and ``velocity_m_s`` with dimensions ``et`` and ``xyz``; coordinates ``et`` (seconds) and
+        ``utc``.
 
     Raises
     ------
@@ -83,21 +84,22 @@ def compare_kernels(
     a, b
         Metakernels (``.tm``), or kernels in load order.
     t0, t1
-        First and last instant, UTC as text or datetime; by default all that both sets cover.
+        First and last instant, UTC as text or datetime; by default the whole time that both sets cover.
 
     Returns
     -------
     xarray.Dataset
         ``position_m`` with dimensions ``set``, ``et`` and ``axis`` (radial, along-track, cross-track of the mean
         orbit); where the sets contain attitudes, ``attitude_arcsec`` with dimensions ``set``, ``et_attitude`` and
-        ``axis``. ``b`` minus ``a`` is twice the deviation of ``b``. Epochs are 1 s apart, or farther apart if there would be more than 10,000. ``attrs["areograph"]``, JSON, contains the statistics.
+        ``axis``. ``b`` minus ``a`` is twice the deviation of ``b``. Epochs are 1 s apart, or farther apart if there
+        would be more than 10,000. ``attrs["areograph"]``, JSON, contains the statistics.
 
     Raises
     ------
     UsageError
         If both sets contain the same kernels.
     CoverageError
-        If the sets have no common time.
+        If the sets cover no common time.
     """
     xarray = optional("xarray")
     if (t0 is None) != (t1 is None):

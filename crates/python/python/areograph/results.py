@@ -159,8 +159,8 @@ class Result:
         """Checks of the verdict; failed checks come first.
 
         Columns: ``kind``, ``what``, ``outcome`` (``fail``, ``warning``, ``pass``), ``subject``, ``value`` and ``limit``
-        in ``unit``, and ``share_of_limit``: the used share of the limit, above 1 if the limit is exceeded, missing if a
-        passed check has no number.
+        in ``unit``, and ``share_of_limit``: the fraction of the limit that is used, above 1 if the limit is exceeded,
+        missing if a passed check has no number.
         """
         pandas = _optional("pandas")
         names = ["kind", "what", "outcome", "subject", "value", "limit", "unit"]
@@ -172,9 +172,9 @@ class Result:
 
     @property
     def footprints(self) -> GeoDataFrame:
-        """Laser shots inside the windows: the points on the ground.
+        """Footprints of the laser shots inside the windows.
 
-        Rows have the numbers that ``footprint_row`` of other tables contains. Longitudes are 0 to 360 degrees in
+        Other tables refer to the row numbers of this table in ``footprint_row``. Longitudes are 0 to 360 degrees in
         ``longitude_deg`` and -180 to 180 degrees in ``geometry``, in the same frame.
         """
         return self._table_of_points(FOOTPRINTS)
@@ -183,10 +183,10 @@ class Result:
     def shots(self) -> GeoDataFrame:
         """Footprints inside images, one row per footprint and image.
 
-        Time (UTC), longitude and latitude (degrees), heights (metres), and line and sample with the orientation from
-        the kernels (``before_``) and with the adjusted orientation (``adjusted_``). Lines and samples are 0 at the
-        leading edge of the first line or pixel and 0.5 at its centre. The adjusted values are missing without an
-        adjustment.
+        Columns contain time (UTC), longitude and latitude (degrees), heights (metres), and line and sample with the
+        orientation from the kernels (``before_``) and with the adjusted orientation (``adjusted_``). Lines and samples
+        are 0 at the outer edge of the first line or sample and 0.5 at its centre. The adjusted values are missing
+        without an adjustment.
         """
         return self._table_of_points("registered_footprints.parquet")
 
@@ -200,7 +200,7 @@ class Result:
         """Line and sample of every footprint in every image, with the orientation from the kernels.
 
         The table contains positions outside the image as well; ``inside`` states whether the delivered image shows the
-        footprint. Lines and samples are 0 at the leading edge of the first line or pixel.
+        footprint. Lines and samples are 0 at the outer edge of the first line or sample.
         """
         return self._table_of("registration.parquet")
 
@@ -263,7 +263,8 @@ class Result:
     def isd(self, image: str, *, adjusted: bool = False) -> dict[str, Any]:
         """Camera model of an image: image support data of the Community Sensor Model.
 
-        Positions have the light-time convention of the run; ``path("exchange/centre/IMAGE_isd.json")`` is the camera model in the convention of ISIS and ALE.
+        Positions follow the light-time convention of the run; ``path("exchange/centre/IMAGE_isd.json")`` is the file of
+        the camera model that follows the convention of ISIS and ALE.
 
         Parameters
         ----------
@@ -292,7 +293,7 @@ class Result:
         return self._once(path, parquet.read_table, key=f"arrow:{path}")
 
     def path(self, product: str) -> Path:
-        """Path of a product file, after a test of its existence and size.
+        """Path of a product file, whose existence and size are checked.
 
         Parameters
         ----------

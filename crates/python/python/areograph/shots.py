@@ -1,4 +1,4 @@
-"""Laser shots: read, searched, joined to tracks, compared with kernels."""
+"""Laser shots: read, searched, joined into tracks, compared with kernels."""
 
 from __future__ import annotations
 
@@ -62,9 +62,9 @@ def read_pedr(
     Returns
     -------
     pyarrow.Table
-        Shots in order of time, with the columns of ``footprints.parquet``, in IAU 2000. Fields state description and
-        unit in their metadata. The metadata ``areograph`` of the schema is a JSON statement of the files, and of
-        records with errors, whose shots are omitted.
+        Shots in time order, with the columns of ``footprints.parquet``, in IAU 2000. Fields state their description
+        and unit in their metadata. The metadata ``areograph`` of the schema is a JSON statement of the files, and of
+        records with errors, whose invalid shots are omitted.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def read_pedr(
     Warns
     -----
     UserWarning
-        If records with errors are omitted with their shots.
+        If invalid shots of records with errors are omitted.
     """
     known = [name for name in _native.shot_columns() if name not in _OF_SEARCH]
     if isinstance(columns, str):
@@ -140,7 +140,7 @@ def search_shots(
     Returns
     -------
     geopandas.GeoDataFrame
-        Shots in order of time. ``geometry`` has longitudes from -180 to 180 degrees, areocentric latitudes, and heights
+        Shots in time order. ``geometry`` contains longitudes from -180 to 180 degrees, areocentric latitudes, and heights
         above the sphere of radius 3396190 m (IAU_2015:49900). ``attrs["areograph"]`` states request, files and
         completeness.
 
@@ -149,12 +149,12 @@ def search_shots(
     InputError
         If a file cannot be searched.
     UsageError
-        If the area, the interval of time or the filter is not valid.
+        If the area, the time interval or the filter is invalid.
 
     Warns
     -----
     UserWarning
-        If records with errors are omitted: shots may be missing.
+        If invalid shots of records with errors are omitted.
     """
     optional("geopandas")
     names = [name for name in _native.shot_columns() if name != "geometry"]
@@ -180,7 +180,7 @@ def tracks(
     t1: Time = None,
     leap_seconds: StrPath | None = None,
 ) -> GeoDataFrame:
-    """Join the ground shots of an archive to tracks, one for each profile.
+    """Join the ground shots of an archive into tracks, one for each profile.
 
     A profile is the part of one orbit in the area; a pause of more than 300 s starts another profile.
 
@@ -192,7 +192,9 @@ def tracks(
     Returns
     -------
     geopandas.GeoDataFrame
-        ``orbit``, ``shots``, ``et_start_s``, ``et_stop_s`` and ``geometry``: lines through the footprints, divided where more than 2 s separate two shots, and at 180 degrees of longitude. A part with a single shot has no line; profiles without any line have points.
+        ``orbit``, ``shots``, ``et_start_s``, ``et_stop_s`` and ``geometry``: lines through the footprints, divided
+        where more than 2 s separate two shots, and at 180 degrees of longitude. A part with a single shot has no line;
+        profiles without any line have points.
     """
     geopandas, shapely = optional("geopandas"), optional("shapely")
     names = ["et_tag_s", "orbit", "longitude_deg", "latitude_deg"]
@@ -236,7 +238,7 @@ def tracks(
 def check_ranges(
     shots: pyarrow.Table | DataFrame, kernels: Paths, *, clock_bias_s: float | None = None
 ) -> DataFrame:
-    """Compare measured ranges with the distances between footprints and the spacecraft positions in kernels.
+    """Compare measured ranges with the distances between footprints and the spacecraft positions from kernels.
 
     Parameters
     ----------
@@ -251,9 +253,10 @@ def check_ranges(
     Returns
     -------
     pandas.DataFrame
-        For every shot, with the index of ``shots``: ``distance_m``; ``range_minus_distance_m`` for the radius before, and
-        ``range_minus_distance_crossover_m`` for the radius after the crossover correction; ``decoding_m``, the same with the spacecraft position in the file; and the spacecraft position in the file minus that in the kernels along the radial,
-        along-track and cross-track axes of the orbit. Metres.
+        For every shot, with the index of ``shots``: ``distance_m``; ``range_minus_distance_m`` with the radius of the
+        footprint before the crossover correction, and ``range_minus_distance_crossover_m`` with that after it;
+        ``decoding_m``, as ``range_minus_distance_m`` but with the spacecraft position in the file; and this position
+        minus that from the kernels along the radial, along-track and cross-track axes of the orbit. Metres.
 
     Raises
     ------
@@ -298,7 +301,7 @@ def _search(
     stated: dict[str, Any] = json.loads(statement)
     if not stated["complete"]:
         warnings.warn(
-            f"{stated['records_left_out']} records with errors are omitted with their shots; the first error: "
+            f"{stated['records_left_out']} records with errors, whose invalid shots are omitted; the first error: "
             f"{stated['first_complaints'][0]}",
             UserWarning,
             stacklevel=3,

@@ -18,7 +18,7 @@ class Stage:
     """A stage of a run."""
 
     name: str
-    #: Whether a run would execute it, or else keep its stored output.
+    #: Whether a run would execute the stage; otherwise the stored output is kept.
     runs: bool
     #: The input that has changed, or why the output is kept.
     because: str

@@ -51,10 +51,11 @@ pub(super) fn worst_profiles(ranges: &ArchiveRanges, worst: &[WorstProfile<'_>])
         ];
         table.row(profile.invalid_because.is_empty(), cells);
     }
-    let words = "Outliers are excluded from the mean and from the distance to the spacecraft in the file itself. Orbits apart \
-                 is the mean difference of spacecraft positions, file minus kernels; it reveals a different orbit, clock or \
-                 datum. The best time-tag correction minimises the spread of ranges, with raw or crossover-corrected \
-                 radii. All profiles are in profiles.parquet and profiles.csv.";
+    let words = "Outliers are excluded from both means of range − distance: with spacecraft positions from the \
+                 kernels (mean), and from the file itself (to own spacecraft). Orbits apart is the length of the mean \
+                 difference of spacecraft positions, file minus kernels; it reveals a different orbit, clock or \
+                 datum. The best time-tag correction minimises the spread of range − distance, with raw or \
+                 crossover-corrected radii. All profiles are in profiles.parquet and profiles.csv.";
     html! { (table.finish()) p { (words) } (commands(worst)) }
 }
 

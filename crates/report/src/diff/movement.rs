@@ -188,8 +188,7 @@ pub(super) fn plots(site: &RunDifference) -> Result<Markup> {
         if !panels.is_empty() {
             figures.push(figure(&Plot::of(
                 format!("{}: image {}", site.site, image.image),
-                "Movement of the camera along the image, B − A, at the samples of both runs."
-                    .to_owned(),
+                "Movement of the camera, B − A, at the samples that both runs have.".to_owned(),
                 "lines from the middle of the header image",
                 panels,
             ))?);

@@ -10,8 +10,8 @@ use areograph_base::schema::DocumentSchema;
 #[derive(Debug, Serialize, JsonSchema)]
 #[schemars(
     title = "Differences between two runs",
-    description = "Answer of `areograph report diff --json`: differences of every site in both outputs, B - A. \
-                   Units are metres, arcseconds and seconds; unknown values are omitted."
+    description = "Answer of `areograph report diff --json`: differences (B - A) of every site that is in both \
+                   outputs. Units are metres, arcseconds and seconds; unknown values are omitted."
 )]
 pub struct Answer<'a> {
     /// Sites of both.
@@ -34,7 +34,7 @@ pub enum SiteAnswer<'a> {
         site: &'a str,
         /// Why.
         error: String,
-        /// Exit code of this failure.
+        /// Exit code of the failure.
         #[schemars(range(min = 1))]
         exit_code: u8,
     },

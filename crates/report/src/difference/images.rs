@@ -98,7 +98,7 @@ pub struct ImageMovement {
 /// Movement of one sample; see [`ImageMovement`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct SampleMovement {
-    /// Line offset from the middle of the header image, lines.
+    /// Line offset from the middle of the image as exposed, lines.
     pub line_offset: f64,
     /// Change of the epoch.
     pub time_s: f64,

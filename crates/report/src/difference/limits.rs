@@ -8,7 +8,7 @@ use super::{Outcome, RunDifference, images::ImageDifference, movement::ROUNDING,
 /// Limits of movements; a missing limit allows any movement.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Limits {
-    /// Limit for footprints, perspective centres and the boresight's ground points, metres.
+    /// Limit for footprints, perspective centres and the ground points of boresights, metres.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0))]
     pub movement_m: Option<f64>,

@@ -81,7 +81,7 @@ pub struct RunDifference {
     pub rejected: Vec<Change>,
     /// Input problems of one run only; manifests quote only the first problems.
     pub complaints: Texts,
-    /// Notes of one run only, without notes on kernels named by a list, which `kernels` contains.
+    /// Notes of one run only, except notes on kernels that a list names, which `kernels` contains.
     pub notes: Texts,
     /// Stages by fingerprint, which depends on the inputs of a stage, not on the outputs.
     pub stages: Items,

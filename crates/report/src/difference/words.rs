@@ -7,6 +7,7 @@ use super::{
     items::{Item, Items},
     movement::{Component, ROUNDING, Size},
 };
+use crate::html::counted;
 use areograph_base::minus::{self, MINUS};
 use areograph_geom::statistics::largest;
 use areograph_store::manifest::Verdict;
@@ -95,7 +96,7 @@ impl RunDifference {
             ));
         }
         if images().any(|movement| movement.time_s.moved()) {
-            sentences.push(format!("lines in time by up to {} s", quantity(time_s)));
+            sentences.push(format!("line times by up to {} s", quantity(time_s)));
         }
         sentences
     }
@@ -232,7 +233,7 @@ impl RunDifference {
             (without(false), "without a line in common"),
         ] {
             if count > 0 {
-                sentences.push(format!("{count} image(s) {why}"));
+                sentences.push(format!("{} {why}", counted(count, "image")));
             }
         }
         sentences
@@ -246,7 +247,7 @@ impl RunDifference {
             sentences.push(match &movement.farthest {
                 None => "none moved".to_owned(),
                 Some(farthest) => format!(
-                    "{} moved, by {} m on average and up to {} m ({} record {} shot {})",
+                    "{} moved, mean movement of all {} m, largest {} m ({} record {} shot {})",
                     movement.moved,
                     quantity(movement.distance_m.mean),
                     quantity(movement.distance_m.max),

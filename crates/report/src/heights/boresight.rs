@@ -18,7 +18,7 @@ pub(super) fn boresight(adjusted: &Adjusted) -> Markup {
         None => Markup::default(),
         Some(Err(reason)) => paragraph(&format!("adjustment.common_bus has no effect: {reason}.")),
         Some(Ok(found)) => {
-            let caption = "Recorded profiles minus their positions from laser and images, metres";
+            let caption = "Recorded positions of the profiles minus their positions from laser and images, metres";
             html! { (words(found)) (table(&found.images)) (profiles(caption, &found.profile_shifts)) }
         }
     }
@@ -38,8 +38,8 @@ fn words(found: &BoresightSummary) -> Markup {
     });
     paragraph(&format!(
         "Camera and laser share a bus: in a simultaneous image, the mounting determines the spot of each shot, \
-         independent of the attitude (adjustment.common_bus). The laser direction differs from the nominal direction by {} \
-         towards X and {} towards Y of the bus.{}",
+         independently of the attitude (adjustment.common_bus). The laser direction differs from the nominal \
+         direction by {} towards X and {} towards Y of the bus.{}",
         angle(0),
         angle(1),
         farthest.unwrap_or_default()

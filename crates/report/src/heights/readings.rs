@@ -18,9 +18,8 @@ pub(super) fn two_readings(adjusted: &Adjusted, is_withheld: bool) -> Markup {
     }
 }
 
-const WORDS: &str = "Tie points show the offset between images, but not which image is in error. A clock offset \
-                     rotates nadir-tracking images but not \
-    inertially held ones.";
+const WORDS: &str = "Tie points show the offset between images, but not which image is in error. An offset of \
+                     the attitude clock rotates images that track nadir, but not images that were held inertially.";
 
 fn table(adjusted: &Adjusted, other: &OtherReading, is_withheld: bool) -> Markup {
     let mut table = Table::new(

@@ -24,7 +24,7 @@ pub(super) fn relief(adjusted: &Adjusted, beforehand: &str) -> Markup {
     let [east_m, north_m] = relief.sigma_m;
     let axes = format!("±{} m E, ±{} m N", label(east_m, 0), label(north_m, 0));
     if relief.used {
-        let caption = "Recorded profiles minus their positions from relief and images, metres";
+        let caption = "Recorded positions of the profiles minus their positions from relief and images, metres";
         return html! {
             p { "Relief alone determines the position to " (axes) "; relief is used (adjustment.relief_for_plan)." }
             (profiles(caption, &relief.profile_shifts))
@@ -36,7 +36,7 @@ pub(super) fn relief(adjusted: &Adjusted, beforehand: &str) -> Markup {
     let than = if is_of_use([east_m, north_m], heights) {
         "much better than"
     } else {
-        "no better than"
+        "not much better than"
     };
     paragraph(&format!(
         "Relief alone would determine the position to {axes}, {than} {beforehand}; relief is not used \

@@ -183,7 +183,7 @@ fn figure(title: &str, shown: &[&Shown]) -> Result<Markup> {
         return Ok(Markup::default());
     }
     let caption = format!(
-        "Similarity over the shifts of {}; best shift in cells, east and north.",
+        "Similarity over the shifts of {}; best similarity and its shift in cells, east and north.",
         counted(shown.len(), "unit")
     );
     Ok(html! {

@@ -128,13 +128,13 @@ impl<'a> BeforeAfter<'a> {
             self.after.map(|after| self.apart(after)),
         );
         let what = if self.by_footprints() {
-            "a footprint falls"
+            "the two positions of a footprint"
         } else {
-            "a tie point falls"
+            "the two positions of a tie point"
         };
         if !self.adjusted {
             return format!(
-                "{}, along track: {what} {} apart.",
+                "{}, along track: {what} are on average {} apart.",
                 self.name(),
                 before.in_words()
             );
@@ -144,7 +144,7 @@ impl<'a> BeforeAfter<'a> {
             |after| format!("{} after it", after.in_words()),
         );
         format!(
-            "{}, along track: {what} {} apart before the adjustment; {after}.",
+            "{}, along track: {what} were on average {} apart before the adjustment; {after}.",
             self.name(),
             before.in_words()
         )

@@ -77,7 +77,8 @@ fn all_profiles(site: &SiteProducts) -> Plot {
         ..Panel::of("range − distance, m", series)
     };
     let caption = format!(
-        "{} profiles in the order of the tables, means from {} to {} m. The {WORST} largest are shown separately.",
+        "{} profiles in the order of the tables, means from {} to {} m. The {WORST} with the largest absolute means \
+         are shown separately.",
         whole(site.profiles.len()),
         metres(extreme(site, f64::min)),
         metres(extreme(site, f64::max))

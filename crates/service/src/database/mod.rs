@@ -61,7 +61,7 @@ pub enum DatabaseError {
     Sqlite(#[source] rusqlite::Error),
     /// Another program holds a lock.
     #[error("another program has locked the database")]
-    #[cause(Io: "close the program that uses the database, and start again")]
+    #[cause(Io: "close the program that uses the database, and try again")]
     Locked,
     /// There is no database.
     #[error("the state folder contains no database")]

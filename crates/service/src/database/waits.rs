@@ -26,7 +26,7 @@ pub struct Wait {
 }
 
 impl Wait {
-    /// Whether the file left its folder.
+    /// Whether the file is no longer in its folder.
     #[must_use]
     pub fn is_lost(&self) -> bool {
         self.state != FileState::Bad.name()

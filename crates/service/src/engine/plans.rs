@@ -165,7 +165,7 @@ impl Context<'_> {
         if runs && causes.is_empty() {
             let (kind, text) = match &self.candidate.site.problem {
                 // A missing file has appeared, and was no input before: a blocked job waits for it, also in a night.
-                Some(_) => (CauseKind::RetryOf, "the site could not be planned before"),
+                Some(_) => (CauseKind::RetryOf, "the previous plan of the site failed"),
                 None => self.without_change(transaction)?,
             };
             causes.push(CauseRow::plain(kind, text, self.now_ms));

@@ -101,18 +101,20 @@ fn after_failure(attempt: &Fruitless<'_>, failure: &Failure, random: Random) -> 
 }
 
 fn after_crash(attempt: &Fruitless<'_>, random: Random) -> (JobState, Moved) {
-    let stage = attempt.stage.unwrap_or("the start");
+    let place = attempt
+        .stage
+        .map_or_else(|| "the start".to_owned(), |stage| format!("stage {stage}"));
     let rss_mib = attempt.ended.rss_peak_kib as f64 / 1024.0;
     if rss_mib > MEMORY_SHARE * f64::from(attempt.memory_mib) {
         let text = format!(
-            "the worker needs more memory than workers.memory_mib = {} allows at stage {stage}",
+            "at {place}, the worker needs more memory than workers.memory_mib = {} allows",
             attempt.memory_mib
         );
         let outcome = json!({ "text": text, "stage": attempt.stage, "rss_mib": rss_mib });
         return counted(JobState::Failed, outcome);
     }
     let outcome = json!({
-        "text": format!("the worker crashes at stage {stage}: {}", words(attempt.ended)),
+        "text": format!("the worker crashed at {place}: {}", words(attempt.ended)),
         "stage": attempt.stage,
     });
     again(attempt, CRASH_ATTEMPTS, outcome, random)

@@ -138,12 +138,12 @@ fn judged(
     let problem = hashed.problem.as_ref().or(problem);
     let (state, detail) = match problem {
         Some(problem) => (FileState::Bad, problem.clone()),
-        None if same => (FileState::Ready, "touched, content unchanged".to_owned()),
+        None if same => (FileState::Ready, "touched; content unchanged".to_owned()),
         None => (FileState::Ready, String::new()),
     };
     let note = match (state, same, &file.blake3) {
         (FileState::Bad, ..) => Some(format!("`{name}` cannot be used: {detail}")),
-        (_, true, _) => Some(format!("`{name}` was touched, content unchanged")),
+        (_, true, _) => Some(format!("`{name}` was touched; its content is unchanged")),
         (_, false, Some(_)) => Some(format!("`{name}` has new content")),
         // A new service starts with many files.
         (_, false, None) => None,
@@ -263,7 +263,7 @@ async fn probe<W: Workers>(
         return Ok(Err(ended));
     };
     if kernels.len() != count {
-        let how = How::Garbled("it does not report every kernel".to_owned());
+        let how = How::Garbled("not every kernel is reported".to_owned());
         let answer = None;
         return Ok(Err(Ended {
             how,

@@ -59,7 +59,7 @@ pub fn words(ended: &Ended) -> String {
         }
         (None, How::Cancelled) => "the worker was stopped".to_owned(),
         (None, How::NoHello) => "the worker did not identify itself".to_owned(),
-        (None, How::ForeignVersion(version)) => format!("the worker is areograph {version}"),
+        (None, How::ForeignVersion(version)) => format!("the worker runs areograph {version}"),
         (None, How::Garbled(what)) => format!("the worker sent an invalid message: {what}"),
         (None, How::NotStarted(why)) => format!("the worker could not be started: {why}"),
     }

@@ -188,7 +188,7 @@ pub(super) struct Operator(pub(super) Caller);
 
 fn caller(parts: &Parts) -> Result<Caller, Problem> {
     let caller = parts.extensions.get::<Caller>().cloned();
-    caller.ok_or_else(|| Problem::internal("a request without a caller"))
+    caller.ok_or_else(|| Problem::internal("the request has no caller"))
 }
 
 fn unknown() -> Problem {

@@ -117,5 +117,7 @@ pub(super) fn name(text: &str) -> Result<&str, Problem> {
     if (1..=64).contains(&text.len()) && text.bytes().all(plain) {
         return Ok(text);
     }
-    Err(Problem::not_found("This name does not exist."))
+    Err(Problem::not_found(
+        "This name is invalid; expected 1 to 64 letters, digits, _ and -.",
+    ))
 }

@@ -56,7 +56,7 @@ async fn pass(app: &App, parts: &Parts) -> Result<Caller, Problem> {
     refuse_token_in(uri)?;
     let peer = parts.extensions.get::<Peer>();
     let peer = peer
-        .ok_or_else(|| Problem::internal("a request without the address of its client"))?
+        .ok_or_else(|| Problem::internal("the request has no client address"))?
         .0;
     let forwarded = headers.contains_key(FORWARDED_FOR) || headers.contains_key(FORWARDED);
     let direct = local_name && !forwarded && peer.ip().is_loopback();

@@ -118,7 +118,7 @@ fn a_touch_hashes_a_file_and_runs_nothing() {
         (plans, hashes + 1)
     );
     let detail = life.ask("SELECT detail FROM file_version WHERE path LIKE '%both.bc'");
-    assert_eq!(detail, ["touched, content unchanged"]);
+    assert_eq!(detail, ["touched; content unchanged"]);
 }
 
 #[test]
@@ -318,7 +318,7 @@ fn failures_are_tried_again_by_their_kind() {
     let text = of("a").outcome.as_ref().unwrap()["text"].as_str().unwrap();
     assert_eq!(
         text,
-        "the worker crashes at stage publish: the worker was ended by signal 9"
+        "the worker crashed at stage publish: the worker was ended by signal 9"
     );
     assert_eq!(of("b").state, JobState::Succeeded);
     let alerts = life.ask("SELECT data FROM event WHERE kind = 'alert'");

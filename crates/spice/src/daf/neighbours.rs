@@ -48,7 +48,7 @@ pub(super) fn check_norms(norms: &[f64]) -> Result<(), String> {
         let off = (norm - 0.5 * (low + high)).abs();
         if count >= 3 && off > NORM_STANDS_OUT && off > STANDS_OUT * (high - low) {
             return Err(format!(
-                "quaternion {} has a norm of {norm:?}; others have a norm of {low:?}",
+                "quaternion {} has a norm of {norm:?}; neighbouring quaternions have a norm of {low:?}",
                 index + 1
             ));
         }
@@ -160,9 +160,12 @@ fn contradiction(states: &[State]) -> Option<String> {
         let spoils = |index: usize| (of(index) - PARTS[part] * own).norm() <= PART_TOLERANCE * size;
         let stands_out = size > STANDS_OUT * usual && size > rounding;
         (stands_out && spoils(1) && spoils(3)).then(|| {
-            let what = ["lies {} km from", "has a velocity {} km/s from"][part];
+            let (what, unit) = [
+                ("lies {} km from", "km"),
+                ("has a velocity {} km/s from", "km/s"),
+            ][part];
             let what = what.replace("{}", &format!("{size:.6}"));
-            format!("{what} the interpolation of its neighbours, which agree to {usual:.1e}")
+            format!("{what} the interpolation of its neighbours, which agree to {usual:.1e} {unit}")
         })
     })
 }

@@ -312,7 +312,7 @@ fn roles_follow_content_and_nothing_is_loaded_twice() {
     );
     assert_eq!(
         set.explanation().last().unwrap(),
-        "one.bsp: not loaded at its earlier position, same content as seven.tls"
+        "one.bsp: not loaded at its earlier position because it has the same content as seven.tls"
     );
     let last = set.kernels().last().unwrap();
     assert_eq!(

@@ -145,8 +145,8 @@ fn the_latest_texts_and_the_files_of_the_wanted_time_are_chosen() {
         "pck00010.tpc: latest of 1 with the rotation of Mars",
         // It ends before the exposures, and alone holds the Sun when the light left that Mars saw then.
         "mgs_map2_first.bsp: position of the Sun when the light that reaches Mars left it",
-        "mgs_map2_gsfc_mgm0827.bsp: not used, not from the orbit solution nav",
-        "mgs_sc_map2_first.bc: not used, contains no attitude near the required times",
+        "mgs_map2_gsfc_mgm0827.bsp: not used because it is not from the orbit solution nav",
+        "mgs_sc_map2_first.bc: not used because it contains no attitude near the required times",
         "README: not used, is a text without a \\begindata block",
     ] {
         assert!(explanation.contains(line), "{line} in {explanation}");

@@ -42,7 +42,7 @@ pub enum AdjustError {
         held_by: String,
     },
     /// An invalid standard deviation, coordinate or number.
-    #[error("{what} is {value}, expected {expected}")]
+    #[error("{what} is {value}; expected {expected}")]
     #[cause("correct this value, or omit the item to which it belongs")]
     Value {
         /// The quantity, with its image, point or profile.
@@ -73,7 +73,8 @@ pub enum AdjustError {
     },
     /// Initial values that the observations contradict.
     #[error(
-        "{what} contradicts the rest of the network: standardised residual {standardised:.1}, expected at most {CONTRADICTION}"
+        "{what} contradicts the rest of the network: standardised residual {standardised:.1}; expected at most \
+         {CONTRADICTION}"
     )]
     #[cause("check the datum, clock and units of this value, or increase its standard deviation")]
     Contradiction {

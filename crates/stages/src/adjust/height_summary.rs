@@ -45,8 +45,9 @@ pub struct HeightSummary {
     pub beyond_limit: usize,
     /// Number of tie points that were rejected for their height; `compared` does not include these points.
     pub rejected: usize,
-    /// Standard deviations of the mean of the tie points in east, north and height, metres: their common errors and, in
-    /// height, the shift of the mean by points beyond the limit, some of which may be in error.
+    /// Standard deviations of the mean of the tie points in east, north and height, metres. They contain the common
+    /// errors of the tie points and, in height, the shift of the mean by points beyond the limit, some of which may be
+    /// in error.
     #[schemars(transform = none_negative)]
     pub mean_sigma_m: [f64; 3],
 }

@@ -42,14 +42,14 @@ pub enum ObservationType {
     MolaImage,
     /// Ranges.
     MolaRange,
-    /// Initial orientation unknowns.
+    /// A priori values of orientation unknowns.
     Orientation,
     /// Initial coordinates of footprints.
     MolaGround,
     /// Given coordinates of tie points.
     TieGround,
     /// Time and range biases, the attitude clock offset and, for a laser on the same bus, boresight angles, profile
-    /// shifts and line times; all are initially 0.
+    /// shifts and line times; all have the a priori value 0.
     Bias,
     /// Laser spots in simultaneous images, computed from the mounting.
     LaserSpot,
@@ -84,15 +84,15 @@ pub struct TypeSummary {
     /// Sum of the redundancy numbers of these observations.
     #[schemars(range(min = 0.0))]
     pub redundancy: f64,
-    /// Part of the weighted sum of squares from these observations.
+    /// Contribution of these observations to the weighted sum of squares.
     #[schemars(range(min = 0.0))]
     pub weighted_squares: f64,
     /// `sqrt(weighted squares / redundancy)`: near 1 if the standard deviations are correct; 0 without redundancy.
     #[schemars(range(min = 0.0))]
     pub variance_component: f64,
-    /// Interval that contains 99 % of the values of `variance_component` if the standard deviations are correct, from the
-    /// χ² distribution; 0 if the redundancy is below 1. With robust weights or overestimated roughness, the value for
-    /// heights is below this interval.
+    /// Interval that contains 99 % of the values of `variance_component` if the standard deviations are correct, from
+    /// the χ² distribution; 0 if the redundancy is below 1. With robust weights or overestimated roughness, the value
+    /// for heights may lie below this interval.
     #[schemars(transform = none_negative)]
     pub variance_component_limits: [f64; 2],
     /// Number of observations with a standardised residual above 3.29.
@@ -121,7 +121,8 @@ impl TypeSummary {
 pub struct GroundSummary {
     /// Adjusted minus initial coordinates X, Y and Z, metres.
     pub corrections_m: [Summary; 3],
-    /// A posteriori standard deviations of X, Y and Z, metres; for footprints, including the shift of the profile.
+    /// A posteriori standard deviations of X, Y and Z, metres; for footprints, including the uncertainty of the shift
+    /// of the profile.
     pub sigmas_m: [Summary; 3],
 }
 
@@ -140,7 +141,7 @@ pub struct ImageSummary {
 /// Statistics of an adjustment.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct AdjustmentSummary {
-    /// Steps of the iteration.
+    /// Number of steps of the iteration.
     pub steps: usize,
     /// Degrees of freedom.
     pub degrees_of_freedom: usize,
@@ -155,13 +156,13 @@ pub struct AdjustmentSummary {
     pub tie_components: [f64; 2],
     /// Standard deviation of the scatter of tie points in addition to their own standard deviations, focal-plane
     /// pixels, from residuals along the track; image jitter causes such scatter. The standard deviations of tie points
-    /// include this scatter, and 1.4 times as much (at most 1.5 px) across the track. 0 if chance explains the
-    /// residuals, and without a blunder limit.
+    /// include this scatter along the track, and 1.4 times as much (at most 1.5 px) across it. The value is 0 if chance
+    /// explains the residuals, or without a blunder limit.
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub tie_scatter_px: f64,
-    /// Factor by which covariances scale the a priori variances: 1, or the square of the larger of `tie_components` if
-    /// this shows that measurements are worse than configured. A good fit never reduces covariances.
+    /// Factor by which the a priori variances are scaled in covariances: 1, or the square of the larger of
+    /// `tie_components` if it shows that measurements are worse than configured. A good fit never reduces covariances.
     #[schemars(range(min = 1.0))]
     pub variance_factor: f64,
     /// Residual statistics of each kind of observation that occurs.
@@ -175,8 +176,8 @@ pub struct AdjustmentSummary {
     /// Range bias of each profile and its standard deviation, metres, if range biases are unknowns.
     #[schemars(transform = at("/items/prefixItems/2", "minimum", 0))]
     pub range_biases_m: Vec<(String, f64, f64)>,
-    /// Pairs of unknowns of one image, or of images that share points, with a correlation above 0.95: the unknowns of a
-    /// pair must not be interpreted individually.
+    /// Pairs of unknowns of one image, or of images that share points, with a correlation of more than 0.95 in
+    /// magnitude: the unknowns of a pair must not be interpreted individually.
     #[schemars(transform = at("/items/prefixItems/2", "minimum", -1.000_001))]
     #[schemars(transform = at("/items/prefixItems/2", "maximum", 1.000_001))]
     pub correlated: Vec<(String, String, f64)>,

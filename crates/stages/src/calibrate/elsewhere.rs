@@ -90,7 +90,7 @@ impl ControlOffset {
     fn words(&self) -> String {
         self.camera.as_ref().map_or_else(
             || "in height".to_owned(),
-            |camera| format!("in the plane of camera {camera}"),
+            |camera| format!("in plan (camera {camera})"),
         )
     }
 
@@ -111,9 +111,9 @@ impl ControlOffset {
         (!(self.offset_m <= self.limit_m)).then(|| {
             format!(
                 "the mean offset of control {} is {:.0} m ± {:.0} m with the calibration; expected at most {:.0} m \
-                 ({OFFSET_MAX} standard deviations of one point and {CALIBRATION_SIGMAS} of the calibration): the \
-                 laser points of both orbits, or the orbits, contradict each other; check the datum and reference \
-                 sphere of both orbits",
+                 (root sum of squares of {OFFSET_MAX} standard deviations of one point and {CALIBRATION_SIGMAS} of the \
+                 calibration): the laser points of the two orbits, or the orbits themselves, contradict each other; \
+                 check the datum and reference sphere of the laser points of both orbits",
                 self.words(),
                 self.offset_m,
                 self.mean_sigma_m,
@@ -133,8 +133,8 @@ fn ties(orbit: &ValidationResult, cameras: &[CameraResult]) -> Vec<String> {
                 && after > TIES_WORSE * before
             {
                 worse.push(format!(
-                    "orbit {}: tie-point residuals {what} the flight in camera {} are {before:.2} px without the calibration \
-                     and {after:.2} px with it",
+                    "orbit {}: tie-point residuals {what} the flight in camera {} are {before:.2} px without the \
+                     calibration and {after:.2} px with it (root mean square)",
                     orbit.orbit, camera.camera
                 ));
             }
@@ -161,14 +161,14 @@ fn control(
     let mut all = Vec::new();
     let figures = before.cameras.iter().zip(&after.cameras).zip(cameras);
     let figures = figures.map(|((before, after), camera)| {
-        let what = format!("control in the plane of camera {}", camera.camera);
+        let what = format!("control in plan (camera {})", camera.camera);
         (what, [before.plane_m, after.plane_m, noise.plane_m])
     });
     let height = [before.height_m, after.height_m, noise.height_m];
     let height = ("control in height".to_owned(), height);
     for (what, [before_m, after_m, noise_m]) in figures.chain([height]) {
         let (Some(before_m), Some(after_m), Some(noise_m)) = (before_m, after_m, noise_m) else {
-            remarks.push(format!("orbit {}: no figures for {what}", orbit.orbit));
+            remarks.push(format!("orbit {}: no values for {what}", orbit.orbit));
             continue;
         };
         all.push(Compared {
@@ -184,7 +184,7 @@ fn control(
 impl Compared {
     fn words(&self) -> String {
         format!(
-            "{} is off by {:.0} m without the calibration and {:.0} m with it",
+            "{} is off by {:.0} m without the calibration and {:.0} m with it (root mean square)",
             self.what, self.before_m, self.after_m
         )
     }
@@ -214,7 +214,7 @@ impl Compared {
         // Written so that NaN counts.
         (!(self.worse_sigmas() <= WORSE_MAX)).then(|| {
             format!(
-                "{}, a deterioration by more than {WORSE_MAX} standard deviations of measurement and laser: check the \
+                "{}, a deterioration of more than {WORSE_MAX} standard deviations of measurement and laser: check the \
                  datum, epoch, lines and samples of the laser points of both orbits, and the orbit accuracy in \
                  [a_priori]",
                 self.words()

@@ -8,8 +8,8 @@ use areograph_base::error::Cause;
 pub enum CalibrateError {
     /// Two images are mounted on different frames.
     #[error(
-        "camera {camera} is mounted on frame {found} (instrument_pointing.time_dependent_frames), camera {first} on \
-         {expected}; expected the spacecraft's frame for all cameras"
+        "camera {camera} is mounted on frame {found} (instrument_pointing.time_dependent_frames), but camera {first} \
+         on {expected}; expected the spacecraft's frame for all cameras"
     )]
     #[cause(
         "write support data in which instrument_pointing ends in the spacecraft's frame and constant_rotation leads \

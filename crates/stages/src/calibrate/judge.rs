@@ -79,7 +79,8 @@ pub(super) fn judge(of: &Evidence<'_>) -> Verdict {
         match last.figures.ties.worst_px() {
             Some(worst_px) if worst_px <= TIES_MAX_PX => {}
             Some(worst_px) => reasons.push(format!(
-                "tie points have residuals of {worst_px:.2} px (root mean square); expected at most {TIES_MAX_PX} px"
+                "residuals of tie points reach {worst_px:.2} px (root mean square per camera and axis); expected at \
+                 most {TIES_MAX_PX} px"
             )),
             None => reasons.push("one camera has no usable tie points".to_owned()),
         }
@@ -130,14 +131,14 @@ fn untested(of: &Evidence<'_>) -> Vec<String> {
     };
     if let Some((plane_m, height_m)) = largest_m(false).zip(largest_m(true)) {
         untested.push(format!(
-            "an error of up to {plane_m:.0} m in the plane and {height_m:.0} m in height in the control of the \
-             calibrated orbit (control of other orbits reveals only larger errors)"
+            "an error of up to {plane_m:.0} m in plan and {height_m:.0} m in height in the control of the calibrated \
+             orbit (control of other orbits reveals only larger errors)"
         ));
     }
     untested
 }
 
-/// Scatter of used or withheld control in the plane or in height, and its limit.
+/// Scatter of used or withheld control in plan or in height, and its limit.
 struct Judged {
     kind: CheckKind,
     /// In words.
@@ -268,9 +269,9 @@ fn coarse(held_back: &HeldBack, known: Known) -> Option<String> {
     let better = plane_m < std::f64::consts::SQRT_2 * known.ground_m && height_m < known.ground_m;
     (!better).then(|| {
         format!(
-            "the accuracy of a tie point is {plane_m:.0} m in the plane and {height_m:.0} m in height, compared with \
-             {:.0} m per axis from the a priori orbit and attitude: the laser control is too coarse, too sparse or too \
-             far away to determine the pointing",
+            "the accuracy of tie points is {plane_m:.0} m in plan and {height_m:.0} m in height (root mean square), \
+             compared with {:.0} m per axis from the a priori orbit and attitude: the laser control is too coarse, too \
+             sparse or too far away to determine the pointing",
             known.ground_m
         )
     })
@@ -306,8 +307,8 @@ fn remarks(of: &Evidence<'_>) -> Vec<String> {
     say(
         sigmas > TIES_SIGMAS,
         format!(
-            "residuals of tie points are {sigmas:.1} times their standard deviations (root mean square): the standard \
-             deviations are too small, and positions are less accurate than stated"
+            "residuals of tie points reach {sigmas:.1} times their standard deviations (root mean square per camera \
+             and axis): the standard deviations are too small, and positions are less accurate than stated"
         ),
     );
     say(

@@ -41,7 +41,7 @@ pub struct Calibration {
     pub complaint_count: u64,
 }
 
-/// Test of tie-point heights against the ground between laser points.
+/// Test of the heights of tie points against the ground between laser points.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TieGround {
     /// Number of tie points in the last test.
@@ -49,8 +49,8 @@ pub struct TieGround {
     /// Limit of the height above or below the ground, standard deviations; tie points beyond this limit are rejected.
     #[schemars(range(min = 0.0))]
     pub limit_sigmas: f64,
-    /// Median over the tie points of the limit of the height above or below the ground, metres: smaller errors along
-    /// the flight are not identified.
+    /// Median, over the tie points, of the limit of the height above or below the ground, metres; height errors below
+    /// this limit, which result from measurement errors along the flight, are not identified.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
     pub limit_m: Option<f64>,
 }
@@ -151,7 +151,7 @@ pub struct ControlFigures {
     pub kind: PointKind,
     /// Points.
     pub points: u64,
-    /// Distances between projected and measured image positions of the laser points, for every camera.
+    /// Root mean square distances between projected and measured image positions of the laser points, for every camera.
     pub cameras: Vec<PixelsAndMetres>,
     /// Number of points in two cameras or more.
     pub heights: u64,
@@ -161,7 +161,7 @@ pub struct ControlFigures {
     pub height_m: Option<f64>,
 }
 
-/// Distances in the focal plane and on the ground; missing for a camera without points.
+/// Root mean square distances in the focal plane and on the ground; missing for a camera without points.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PixelsAndMetres {
     /// Root mean square distance in the focal plane, pixels.
@@ -177,11 +177,11 @@ pub struct PixelsAndMetres {
 pub struct HeldBack {
     /// Points.
     pub points: u64,
-    /// Ratio of the residuals of withheld control to the expected residuals.
+    /// Ratio of the root mean square residual of withheld control to its expected value.
     pub scatter: Scatter,
     /// Number of withheld points in two cameras or more, whose positions are intersected.
     pub intersected: u64,
-    /// Root mean square horizontal distance between intersected and laser positions, metres, including laser and
+    /// Root mean square horizontal distance between intersected and laser positions, metres, which contains laser and
     /// measurement errors; missing if no point is intersected.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
     pub plane_m: Option<f64>,
@@ -191,8 +191,8 @@ pub struct HeldBack {
     /// Mean of intersected minus laser position, east, north and up, metres; missing if no point is intersected.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
     pub mean_m: Option<[f64; 3]>,
-    /// Stated accuracy of a tie point in the plane, metres: root mean square of the standard deviations, scaled by the
-    /// scatter of used or withheld control in the plane if this scatter exceeds 1.
+    /// Stated accuracy of a tie point in plan, metres: root mean square of the standard deviations, scaled by the
+    /// scatter of used or withheld control in plan if this scatter exceeds 1.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
     pub accuracy_plane_m: Option<f64>,
     /// Stated accuracy of a tie point in height, metres.
@@ -201,8 +201,8 @@ pub struct HeldBack {
 }
 
 /// Ratio of the root mean square residual of control to the value expected from measurement, laser and calibration:
-/// near 1 if standard deviations are correct. Plane and height are separate, because too large standard deviations in
-/// one hide errors in the other.
+/// near 1 if standard deviations are correct. Plane and height are separate, because overestimated standard deviations
+/// in one would hide errors in the other.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Scatter {
     /// Scatter in east and north; missing if the points have no redundancy.
@@ -280,7 +280,8 @@ pub struct ValidationResult {
     pub before: Figures,
     /// With the calibration, unchanged.
     pub after: Figures,
-    /// Mean offsets of the control of the orbit with the calibration, in the plane of every camera and in height.
+    /// Mean offsets of the control of the orbit, computed with the calibrated cameras, in plan in every camera and
+    /// in height.
     pub offsets: Vec<ControlOffset>,
 }
 
@@ -290,17 +291,17 @@ pub struct ControlOffset {
     /// Camera in whose plane the offset is measured; absent for an offset in height.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
     pub camera: Option<String>,
-    /// Length of the mean offset in the plane, or absolute mean height above the laser, metres.
+    /// Length of the mean offset in plan, or absolute value of the mean height above the laser points, metres.
     #[schemars(range(min = 0.0))]
     pub offset_m: f64,
-    /// Standard deviation of one control point from measurement and laser, metres.
+    /// Standard deviation of one control point due to errors of measurement and laser, metres.
     #[schemars(range(min = 0.0))]
     pub point_sigma_m: f64,
-    /// Standard deviation of the mean offset from measurement and laser, metres, without errors of the orbit and of the
-    /// calibration.
+    /// Standard deviation of the mean offset due to errors of measurement and laser, metres, without errors of the
+    /// orbit and of the calibration.
     #[schemars(range(min = 0.0))]
     pub mean_sigma_m: f64,
-    /// Standard deviation of the mean offset from the calibration, metres.
+    /// Standard deviation of the mean offset due to errors of the calibration, metres.
     #[schemars(range(min = 0.0))]
     pub calibration_sigma_m: f64,
     /// Largest permitted offset, metres.

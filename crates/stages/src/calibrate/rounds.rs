@@ -163,8 +163,8 @@ impl Calibration {
                 _ => "an unknown share".to_owned(),
             };
             reasons.push(format!(
-                "no convergence in {count} rounds: in the last round, units are shifted by {:.2} cells (median) and \
-                 residuals of control change by {change}; expected less than {SHIFT_CELLS} cells and {:.0} %",
+                "no convergence in {count} rounds: in the last round, units were shifted by {:.2} cells (median), and \
+                 residuals of control changed by {change}; expected less than {SHIFT_CELLS} cells and {:.0} %",
                 rounds.shift_cells(),
                 100.0 * CONTROL_SHARE
             ));

@@ -267,7 +267,7 @@ fn known(row: &ControlRow, sigma: ControlSigma) -> KnownPlace {
     known_place(place_m, sigma_m)
 }
 
-/// A place with its standard deviations in the plane and in height, metres.
+/// A place with its standard deviations in plan and in height, metres.
 pub(super) fn known_place(
     place_m: Vector3<f64>,
     [horizontal_m, vertical_m]: [f64; 2],

@@ -85,7 +85,7 @@ pub(super) fn validate(
     Ok((result, noise))
 }
 
-/// Mean offsets of control under a calibration: in the plane of every camera, and in height.
+/// Mean offsets of control under a calibration: in plan in every camera, and in height.
 fn offsets(
     points: &[OrbitPoint],
     state: &CalibrationState,
@@ -117,7 +117,7 @@ fn offsets(
     planes.chain([height]).flatten().collect()
 }
 
-/// Variances of control in the plane and in height by the errors of the cameras, over the variances of measurement and
+/// Variances of control in plan and in height by the errors of the cameras, over the variances of measurement and
 /// laser: means over the points. The orbit has its own drift.
 fn calibration_shares(
     points: &[OrbitPoint],
@@ -253,8 +253,8 @@ fn orbit(
     }
     for other in found {
         complaints.tell(format!(
-            "validation {}: support data of {} are not used, because they match no camera of the calibration, or a \
-             camera that already has support data",
+            "validation {}: support data of {} are not used, because they match no camera of the calibration, or match \
+             a camera that already has support data",
             of.id, other.support.instrument.name
         ));
     }

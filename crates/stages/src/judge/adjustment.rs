@@ -66,7 +66,7 @@ impl AdjustmentEvidence<'_> {
         for (round, pairs, limit_m) in rounds {
             for pair in pairs.iter().filter(|pair| !is_together(pair, limit_m)) {
                 invalid.push(format!(
-                    "tie-point positions from {} and {} differ by {:.1} m along the flight {round} the adjustment, \
+                    "tie-point positions from {} and {} differ by {:.1} m along the flight {round} the adjustment; \
                      expected at most {limit_m} m",
                     pair.images[0], pair.images[1], pair.along_track_parallax_m
                 ));
@@ -86,7 +86,7 @@ impl AdjustmentEvidence<'_> {
         (!(*sigmas <= limit)).then(|| {
             format!(
                 "laser and images contradict each other: the {unknown} differs by {sigmas:.1} standard deviations from \
-                 its a priori value, expected at most {limit}; check beam.bus of the altimeter, altimeter_clock and \
+                 its a priori value; expected at most {limit}; check beam.bus of the altimeter, altimeter_clock and \
                  the image times, or omit adjustment.common_bus"
             )
         })
@@ -142,7 +142,7 @@ impl AdjustmentEvidence<'_> {
             // Written so that NaN counts.
             if check.surface.is_ok() && !(check.above_m.median.abs() <= limit_m) {
                 reasons.push(format!(
-                    "tie points lie {} m above the {altimeter} surface {round} the adjustment (median of {}), expected \
+                    "tie points lie {} m above the {altimeter} surface {round} the adjustment (median of {}); expected \
                      at most ±{limit_m:.1} m",
                     signed(check.above_m.median, 1),
                     check.above_m.n
@@ -154,7 +154,7 @@ impl AdjustmentEvidence<'_> {
             if !(sigmas <= limit) {
                 reasons.push(format!(
                     "profiles {} and {} contradict each other: their surfaces at the tie points differ by {:.1} m on \
-                     average, {sigmas:.1} standard deviations, expected at most {limit:.1}",
+                     average, {sigmas:.1} standard deviations; expected at most {limit:.1}",
                     apart.profiles[0],
                     apart.profiles[1],
                     apart.mean_m.abs(),
@@ -257,8 +257,8 @@ impl AdjustmentEvidence<'_> {
         above.map(|of| {
             let [_, most] = of.variance_component_limits;
             format!(
-                "residuals of {} are {:.2} times their a priori standard deviations, by chance at most {most:.2}: the \
-                 standard deviations are too small, or a model is incorrect",
+                "the variance component of {} is {:.2}, by chance at most {most:.2}: the a priori standard deviations \
+                 are too small, or a model is incorrect",
                 terms.fill(of.kind.words()),
                 of.variance_component
             )
@@ -377,7 +377,7 @@ impl AdjustmentEvidence<'_> {
         let taken = self.taken();
         if taken < limits.ties_min as usize {
             remarks.push(format!(
-                "only {taken} tie points were used in the adjustment, expected at least {}",
+                "only {taken} tie points were used in the adjustment; expected at least {}",
                 limits.ties_min
             ));
         }
@@ -385,8 +385,9 @@ impl AdjustmentEvidence<'_> {
             match found {
                 // Written so that NaN counts.
                 Some(found) if !(found <= limits.sigma0_max) => remarks.push(format!(
-                    "residuals of the tie points {axis} the track are {found:.2} times the value expected from \
-                     adjustment.tie_sigma_px: measurements are less accurate than configured, or a model is incorrect"
+                    "the variance component of tie points {axis} the track is {found:.2}; expected at most {}: \
+                     measurements are less accurate than configured (adjustment.tie_sigma_px), or a model is incorrect",
+                    limits.sigma0_max
                 )),
                 Some(_) => {}
                 None => remarks.push(format!(
@@ -396,8 +397,9 @@ impl AdjustmentEvidence<'_> {
         }
         remarks.extend(self.loose_ties().map(|found| {
             format!(
-                "residuals of tie points along the track are {found:.2} times their standard deviations (median): \
-                 blunders of tie points may remain; configure smaller standard deviations"
+                "standardised residuals of tie points along the track have a robust standard deviation of {found:.2}; \
+                 expected at least {TIES_LOOSE}: blunders of tie points may remain; configure smaller standard \
+                 deviations"
             )
         }));
         let scatter_px = self.adjusted.summary.tie_scatter_px;

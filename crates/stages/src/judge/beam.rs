@@ -96,8 +96,8 @@ impl Deviation {
             format!("{:.1} km", ground_m / METRES_PER_KM)
         };
         format!(
-            "{images}: according to {whose}, the beam of {} in the {} deviates by {} mrad {} from its mounting, \
-             {ground} on the ground ({} shots), {limit}",
+            "{images}: according to {whose}, the beam of {} in the {} deviates by {} mrad {} from its mounting \
+             ({ground} on the ground, {} shots){limit}",
             terms.altimeter,
             terms.shot_source(),
             signed(PER_MILLI * self.angle_rad, 2),
@@ -306,7 +306,7 @@ pub(super) fn invalid_because(evidence: &Evidence<'_>) -> Vec<String> {
             let limit = PER_MILLI * limit_sigma * deviation.sigma_rad;
             deviation.text(
                 &format!(
-                "expected at most {limit:.2} mrad; check the C-kernels, pointing.ck_bias_s and altimeter_clock, and \
+                "; expected at most {limit:.2} mrad; check the C-kernels, pointing.ck_bias_s and altimeter_clock, and \
                  check that the shots belong to this orbit"
                 ),
                 &evidence.terms,
@@ -316,8 +316,9 @@ pub(super) fn invalid_because(evidence: &Evidence<'_>) -> Vec<String> {
     for (image, of, least) in evidence.beam.places() {
         if f64::from(of.inside) < least {
             reasons.push(format!(
-                "image {}: its orientation places {} of {} simultaneous footprints inside, and the mountings of camera \
-                 and laser place all of them inside; expected at least {least:.0}: check attitude, frames and times",
+                "image {}: its orientation places {} of {} simultaneous footprints inside, whereas the mountings of \
+                 camera and laser place all of them inside; expected at least {least:.0}: check attitude, frames and \
+                 times",
                 image.image, of.inside, of.expected_inside
             ));
         }
@@ -328,7 +329,7 @@ pub(super) fn invalid_because(evidence: &Evidence<'_>) -> Vec<String> {
         if !(apart_m <= limit_m) {
             reasons.push(format!(
                 "image {image}: the spacecraft position in its support data differs by {apart_m:.0} m from the \
-                 position in the {source}, expected at most {limit_m:.0} m; check that the support data belong to this \
+                 position in the {source}; expected at most {limit_m:.0} m; check that the support data belong to this \
                  image, and check their frame"
             ));
         }
@@ -358,7 +359,7 @@ pub(super) fn remarks(evidence: &Evidence<'_>) -> Vec<String> {
             let sigmas = deviation.angle_rad.abs() / deviation.sigma_rad;
             deviation.text(
                 &format!(
-                    "{sigmas:.1} standard deviations: the position is less certain than stated"
+                    ", {sigmas:.1} standard deviations: the position is less certain than stated"
                 ),
                 &evidence.terms,
             )

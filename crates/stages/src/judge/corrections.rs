@@ -95,7 +95,7 @@ impl AdjustmentEvidence<'_> {
         let far = far.filter(|of| !of.is_within(of.multiple * limit));
         let far = far.map(|of| {
             format!(
-                "image {}: the adjustment corrects its {} by {:.1} standard deviations, expected at most {}; check its \
+                "image {}: the adjustment corrects its {} by {:.1} standard deviations; expected at most {}; check its \
                  time and kernels, and pointing.ck_bias_s",
                 of.image,
                 of.unknown.quantity(),
@@ -113,8 +113,8 @@ impl AdjustmentEvidence<'_> {
         let drifts = drifts.filter(|of| !of.is_within(limit) && of.is_within(of.multiple * limit));
         let drifts = drifts.map(|of| {
             format!(
-                "image {}: the adjustment corrects its {} by {:.1} standard deviations, usually at most {limit}: the attitude \
-                 drifts by more than assumed, or the label states a wrong time or summing",
+                "image {}: the adjustment corrects its {} by {:.1} standard deviations (usually at most {limit}): the \
+                 attitude drifts by more than assumed, or the label states a wrong time or summing",
                 of.image,
                 of.unknown.quantity(),
                 of.sigmas

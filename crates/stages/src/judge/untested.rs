@@ -175,8 +175,7 @@ fn shots(evidence: &Evidence<'_>, is_attitude_tested: bool) -> Group {
     }
     if is_attitude_tested {
         group = group.with(
-            "an attitude error that the images share with the footprints, whose files do not state the attitude used \
-             for their computation",
+            "an attitude error that the images share with the footprints, for which shot files state no attitude",
         );
     }
     group

@@ -32,7 +32,7 @@ pub(super) enum PairError {
     )]
     NothingInCommon { images: [String; 2] },
     #[error(
-        "images {} and {} have nearly the same viewing direction: their rays converge by {degrees:.2} degrees, \
+        "images {} and {} have nearly the same viewing direction: their rays intersect at {degrees:.2} degrees; \
          expected at least 0.57",
         images[0], images[1]
     )]

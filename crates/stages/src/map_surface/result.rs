@@ -113,8 +113,8 @@ pub struct ShotOnSurface {
 pub struct ProfileOnSurface {
     /// Its identifier.
     pub profile: String,
-    /// Standard deviation of the heights of all shots of the profile due to attitude errors, metres: 0 at nadir where the
-    /// attitude is known.
+    /// Standard deviation of the height error that all shots of the profile share due to attitude errors, metres: 0 at
+    /// nadir where the attitude is known.
     pub attitude_sigma_m: f64,
     /// Heights of the profile's shots minus heights of the terrain model, metres.
     pub above_m: Summary,

@@ -159,16 +159,18 @@ fn scattered(widened: Widened) -> Option<String> {
     let Widened { shift, bias } = widened;
     (shift.max(bias) > WIDENED_MAX).then(|| {
         format!(
-            "units scatter more than their shots predict (shifts {shift:.1} times, biases {bias:.1} times): the shots \
-             of a unit share a model error; standard deviations are multiplied by these factors"
+            "shifts and biases of units scatter more than predicted from their shots (shifts {shift:.1} times, biases \
+             {bias:.1} times): the shots of a unit share a model error; standard deviations are multiplied by these \
+             factors"
         )
     })
 }
 
 /// Reason and remark on a bias.
 fn bias([bias_m, limit_m]: [f64; 2], of: &Evidence<'_>) -> (Option<String>, Option<String>) {
-    let lies =
-        format!("the bias of the model is {bias_m:.0} m (median over all units, from correlation)");
+    let lies = format!(
+        "the bias of the model is {bias_m:.0} m (median of the kept units, from correlation)"
+    );
     let [apart_m, near_m] = SPHERES_M;
     if !of.radius_is_stated && (bias_m.abs() - apart_m).abs() <= near_m {
         let wrong = format!(
@@ -181,8 +183,8 @@ fn bias([bias_m, limit_m]: [f64; 2], of: &Evidence<'_>) -> (Option<String>, Opti
     match of.similarity {
         Similarity::Ccc if is_beyond => {
             let wrong = format!(
-                "{lies}, and concordance does not remove it: a bias beyond {limit_m:.0} m displaces shifts; check the \
-                 reference sphere of the heights, or use --similarity auto"
+                "{lies}, and concordance does not remove it: a bias beyond {limit_m:.0} m distorts the shifts; check \
+                 the reference sphere of the heights, or use --similarity auto"
             );
             (Some(wrong), None)
         }

@@ -136,8 +136,8 @@ pub(super) fn widen(units: &mut [UnitResult], cell_m: [f64; 2]) -> Option<Widene
         let sigmas = east.normalised[index].hypot(north.normalised[index]) / widened.shift;
         if off_cells > OFF_CELLS && sigmas > OFF_SIGMAS {
             units[of.unit].refused_because = format!(
-                "its shift deviates by {off_cells:.1} cells, {sigmas:.0} standard deviations, from the plane through \
-                 the units; expected at most {OFF_CELLS} cell or {OFF_SIGMAS} standard deviations"
+                "its shift deviates by {off_cells:.1} cells, {sigmas:.0} standard deviations, from the plane fitted to \
+                 the shifts; expected at most {OFF_CELLS} cell or {OFF_SIGMAS} standard deviations"
             );
         }
     }

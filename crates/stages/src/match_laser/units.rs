@@ -271,7 +271,7 @@ pub(super) fn refuse_lonely(units: &mut [UnitResult], search_cells: u32) -> usiz
         let [east, north] = [0, 1].map(|axis| found.shift_cells[axis] - median[axis]);
         if !(east.hypot(north) < most) {
             unit.refused_because = format!(
-                "its shift differs by {:.0} cells from the median of all units; expected less than {most:.1}",
+                "its shift differs by {:.0} cells from the median of the kept units; expected less than {most:.1}",
                 east.hypot(north)
             );
         }

@@ -37,7 +37,7 @@ pub(super) fn leave_out(points: &mut Vec<TiePoint>) -> Option<String> {
             }
             Some(first) => {
                 repeated += 1;
-                example.get_or_insert_with(|| format!("{} those of {first}", point.id));
+                example.get_or_insert_with(|| format!("{}, a duplicate of {first}", point.id));
                 false
             }
         }

@@ -85,14 +85,14 @@ impl ImageRegistration {
     }
 }
 
-/// Differences between another model and the production model of the same image at the same points.
+/// Differences between another model and the model in use, for the same image at the same points.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ModelDifference {
     /// The other model.
     pub model: CameraModel,
-    /// Line of the other model minus line of the production model.
+    /// Line of the other model minus line of the model in use.
     pub lines: Summary,
-    /// Sample of the other model minus sample of the production model.
+    /// Sample of the other model minus sample of the model in use.
     pub samples: Summary,
 }
 

@@ -135,9 +135,10 @@ impl Difference {
         let boresight = own.to_mars.matrix() * Vector3::z();
         let range_m = range_to_ellipsoid_m(body.model(), &own.position, &boresight);
         Some(format!(
-            "support data and kernels contradict each other in the middle of the image: boresights differ by {:.2} mrad, {:.2} km on the \
-             ground, expected at most {:.2} mrad, and positions by {:.0} m, expected at most {POSITION_M} m; check \
-             which of the two belongs to the image, or omit the orbit and attitude kernels of its spacecraft",
+            "support data and kernels contradict each other in the middle of the image: boresights differ by {:.2} \
+             mrad ({:.2} km on the ground; expected at most {:.2} mrad) and positions by {:.0} m (expected at most \
+             {POSITION_M} m); check which of the two belongs to the image, or omit the orbit and attitude kernels of \
+             its spacecraft",
             1e3 * self.boresight_rad,
             self.boresight_rad * range_m / METRES_PER_KM,
             1e3 * BORESIGHT_RAD,

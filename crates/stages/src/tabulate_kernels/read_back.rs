@@ -50,8 +50,8 @@ pub fn require_same(
         return Ok(());
     }
     let what = format!(
-        "image {}: positions differ by {distance_m:.1e} m and rotations by {turn_rad:.1e} rad; expected at most \
-         {POSITION_TOLERANCE_M} m and {ROTATION_TOLERANCE_RAD} rad",
+        "image {}: positions read back differ by {distance_m:.1e} m and rotations by {turn_rad:.1e} rad from the \
+         adjusted orientation; expected at most {POSITION_TOLERANCE_M} m and {ROTATION_TOLERANCE_RAD} rad",
         image.id
     );
     Err(TabulateError::ReadBack { what }.into())

@@ -199,8 +199,8 @@ pub(super) fn start_agrees(
     let ground_m = apart_s * GROUND_SPEED_M_S;
     Ok((apart_s > close_s(utc)).then(|| Disagreement {
         text: format!(
-            "clock {sclk} is {apart_s:.3} s away from UTC {utc}, {} on the ground; labels agree within 0.005 s, and \
-             the clock is used{lacks_second}",
+            "clock {sclk} is {apart_s:.3} s away from UTC {utc}, {} on the ground; clock and UTC of a label usually \
+             agree within 0.005 s; the clock is used{lacks_second}",
             ground(ground_m)
         ),
         ground_m,

@@ -57,8 +57,8 @@ pub(super) fn camera_agrees(camera: &Instrument, known: &[Instrument]) -> Option
     };
     Some(Disagreement {
         text: format!(
-            "its camera differs in {} from the built-in file of {}, whose frame the camera names{displaced}: kernels \
-             do not test the geometry of a camera",
+            "its camera differs in {} from the built-in file of {}, although both name the same frame{displaced}: \
+             kernels do not test the geometry of a camera",
             differs.join(", "),
             other.name
         ),

@@ -9,7 +9,7 @@ use areograph_base::{
 #[derive(Debug, thiserror::Error, Cause)]
 #[cause(Input)]
 pub(super) enum ImageError {
-    #[error("image {image}: no {key}, neither in the label nor in the configuration")]
+    #[error("image {image}: {key} is neither in the label nor in the configuration")]
     #[cause(Configuration: "add `{key}` to the image's table, or name its label")]
     Missing { image: String, key: &'static str },
     #[error(

@@ -12,7 +12,7 @@ pub enum NetError {
     #[cause("give tables with measurements in measurements.files")]
     NoMeasurement,
     /// Fewer than two controls that a picture shows.
-    #[error("controls measured in a picture: {found}; expected two or more")]
+    #[error("controls measured in pictures: {found}; expected two or more")]
     #[cause("give at least two controls with the names of measured points")]
     TooFewControls {
         /// Number found.
@@ -55,7 +55,7 @@ pub enum NetError {
         second: String,
     },
     /// A picture is a mirror image.
-    #[error("picture {picture} is a mirror image compared with its neighbours")]
+    #[error("picture {picture} is mirrored relative to its neighbours")]
     #[cause(
         "change the sign of one coordinate of this picture, which may have been measured from the back of the film"
     )]
@@ -64,7 +64,7 @@ pub enum NetError {
         picture: String,
     },
     /// All pictures are mirror images.
-    #[error("the pictures are a mirror image of the controls")]
+    #[error("the pictures are mirrored relative to the controls")]
     #[cause("set measurements.y_axis to the direction of y in the pictures")]
     MirroredFigure,
     /// A picture differs in size from its table.
@@ -104,7 +104,9 @@ pub enum NetError {
     },
     /// Ticks that give no correction.
     #[error("the film of picture {picture}: {problem}")]
-    #[cause("give the four corner ticks of the picture, and either no or all four mid-edge ticks")]
+    #[cause(
+        "give the four corner ticks of the picture, and either none or all four of the mid-edge ticks"
+    )]
     Film {
         /// The picture.
         picture: String,

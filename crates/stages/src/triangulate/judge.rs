@@ -162,7 +162,7 @@ fn remarks(of: &Evidence) -> Vec<String> {
     let kept = of.controls.len() - rejected.len();
     say(
         kept < CONTROLS_MIN,
-        format!("{kept} controls: a gross error in one of them could not be identified"),
+        format!("{kept} controls: a gross error in one of them cannot be identified"),
     );
     say(
         kept == 2 && of.controls.iter().all(|control| control.sigma_m.is_none()),
@@ -177,8 +177,8 @@ fn remarks(of: &Evidence) -> Vec<String> {
         say(
             x.max(y) > SEAMS_SIGMA * sigma_m,
             format!(
-                "bricks differ at their seams by {:.1} m (rms), measurements within bricks by {sigma_m:.1} m: a \
-                 brick may be distorted; one_shot adjusts all pictures at once",
+                "bricks differ at their seams by {:.1} m (root mean square), but measurements within bricks have a \
+                 standard deviation of {sigma_m:.1} m: a brick may be distorted; one_shot adjusts all pictures at once",
                 x.max(y)
             ),
         );

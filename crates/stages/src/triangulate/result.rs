@@ -141,7 +141,7 @@ pub struct BrickResult {
     pub pictures: u32,
     /// Number of points on several pictures of the brick.
     pub ties: u32,
-    /// Equations beyond the unknowns.
+    /// Number of equations beyond the unknowns.
     pub redundancy: u32,
     /// Largest |δX| and |δY|, metres.
     pub largest_m: [f64; 2],
@@ -151,7 +151,7 @@ pub struct BrickResult {
     pub robust_sigma_m: f64,
     /// Number of measurements in use with deviations beyond 3.5 robust standard deviations.
     pub flagged: u32,
-    /// Measurements that were rejected.
+    /// Number of measurements that were rejected.
     pub removed: u32,
     /// Shrinkage caused by the two approximate points of a brick, before the shrinkage is removed.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
@@ -170,7 +170,7 @@ pub struct ShrinkageResult {
 /// Seams between bricks, as in the last row of Table 1 of Arthur & McMacken 1977.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Seams {
-    /// Points on several bricks.
+    /// Number of points on several bricks.
     pub points: u32,
     /// Largest |δX| and |δY| of a brick relative to the mean over the bricks, metres.
     pub largest_m: [f64; 2],
@@ -191,9 +191,9 @@ pub struct Totals {
     pub tie_equations: u64,
     /// Number of equations of kept controls.
     pub control_equations: u64,
-    /// Unknowns, four a picture.
+    /// Number of unknowns, four per picture.
     pub unknowns: u64,
-    /// Equations beyond the unknowns.
+    /// Number of equations beyond the unknowns.
     pub redundancy: u64,
     /// Standard deviation of a coordinate of the image of a tie, as used, metres; absent if not determined.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
@@ -207,11 +207,11 @@ pub struct Totals {
     pub control_rms_m: [f64; 2],
     /// Root mean square of the deviations in use, X and Y, metres.
     pub deviation_rms_m: [f64; 2],
-    /// Measurements that were rejected.
+    /// Number of measurements that were rejected.
     pub removed: u64,
     /// Number of flagged measurements in use.
     pub flagged: u64,
-    /// Controls that were rejected.
+    /// Number of controls that were rejected.
     pub rejected_controls: u64,
     /// Largest standard deviation of a point coordinate, metres; absent if none is known.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]

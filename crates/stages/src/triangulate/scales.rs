@@ -180,9 +180,9 @@ impl Scales {
         // Written so that NaN counts.
         (!(of.ratio <= limit)).then(|| {
             format!(
-                "the controls are stretched by {:.1} % relative to the pictures, most at {:.0}° from east; expected at \
-                 most {:.1} %; check that both coordinates of the controls have the same unit and refer to the map in \
-                 the table [map]",
+                "the controls are stretched by {:.1} % relative to the pictures, most in the direction {:.0}° north of \
+                 east; expected at most {:.1} %; check that both coordinates of the controls have the same unit and \
+                 refer to the map in the table [map]",
                 100.0 * of.ratio,
                 of.direction_rad.to_degrees(),
                 100.0 * limit

@@ -21,21 +21,22 @@ const PIXEL_MAX_M: f64 = 1e7;
 /// Finds the images of the mission's cumulative index that may show ground in a window, and pairs of these
 /// images.
 ///
-/// An image is listed if its outline meets a window within the uncertainty of the index: 0.35 degrees of latitude
-/// (areographic or areocentric), 0.3 degrees of longitude over cos(latitude) (prime meridian). The search therefore
-/// misses no image, and also finds images just outside a window; `areograph run` determines the ground that an image
-/// shows.
+/// An image is listed if its outline meets a window within the uncertainty of the index: 0.35 degrees of latitude, which
+/// may be areographic or areocentric, and 0.3 degrees / cos(latitude) of longitude, due to the prime meridian. The search
+/// therefore misses no image, and also finds images just outside a window; `areograph run` determines the ground that an
+/// image shows.
 ///
 /// Pairs are images of different orbits (by the index, else by times more than 30 minutes apart) with common ground. Best
-/// first: overlap × min(convergence / 20°, 1) × cos²(difference of the Sun / 2) / ratio of the pixels. Convergence is the
-/// angle between the rays to the spacecraft, each at the centre of its own image, since lines are exposed one by one.
+/// first: overlap × min(convergence / 20°, 1) × cos²(angle between the directions to the Sun / 2) / ratio of the pixel
+/// sizes. Convergence is the angle between the rays to the spacecraft, each at the centre of its own image, since lines are
+/// exposed one by one.
 ///
 /// Example: areograph image search cumindex.tab --box 137.0,138.0,-5.5,-4.0
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 #[command(group = ArgGroup::new("where").required(true).multiple(true).args(["box", "polygons", "windows", "sites"]))]
 pub(in crate::cli::image) struct Arguments {
-    /// Indexes of the archive (cumindex.tab, imgindex.tab), their labels (.lbl) beside them.
+    /// Indexes of the archive (cumindex.tab, imgindex.tab), with their labels (.lbl) beside them.
     #[arg(required = true, value_name = "INDEX")]
     pub(super) indexes: Vec<PathBuf>,
     #[command(flatten)]

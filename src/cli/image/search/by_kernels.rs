@@ -44,7 +44,7 @@ pub(super) fn compare(found: &mut [Found], metakernel: &Path) -> Result<()> {
     distances_m.sort_by(f64::total_cmp);
     if let Some(largest_m) = distances_m.last() {
         tracing::info!(
-            "distances of the corners of {} images from the kernels: median {:.1} km, largest {:.1} km",
+            "distances of the corners of {} images from those computed from the kernels: median {:.1} km, largest {:.1} km",
             distances_m.len(),
             kilometres(distances_m[distances_m.len() / 2]),
             kilometres(*largest_m)

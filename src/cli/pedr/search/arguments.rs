@@ -38,7 +38,7 @@ pub(in crate::cli::pedr) struct Arguments {
     pub(super) leap_seconds: Option<PathBuf>,
     #[command(flatten)]
     pub(super) shots: FilterArguments,
-    /// Report every bad record of the files, not only those near the windows.
+    /// Report every invalid record of the files, not only those near the windows.
     #[arg(long)]
     pub(super) check_all: bool,
     /// Format of the shots; by default from the extension of --out; without --out shots are only counted.
@@ -79,8 +79,8 @@ impl Format {
 pub(super) enum Usage {
     #[error("{0:?} is not a time interval")]
     #[cause(
-        "write A..B with seconds past J2000 (-25000000..-24990000), or with UTC \
-         (1999-03-16T00:00:00..1999-03-17T00:00:00) and --leap-seconds"
+        "write A..B in seconds past J2000 (-25000000..-24990000), or in UTC \
+         (1999-03-16T00:00:00..1999-03-17T00:00:00) with --leap-seconds"
     )]
     Time(String),
     #[error("{0}; expected the extension .parquet, .csv or .geojson")]

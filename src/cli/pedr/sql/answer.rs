@@ -55,7 +55,7 @@ pub(super) enum Answer {
     },
 }
 
-/// Writer to standard output: a closed pipe (`| head`) is not a failure, a refusal of the disk is.
+/// Writer to standard output: a closed pipe (`| head`) is not a failure, but a write error is.
 struct Reader {
     out: Stdout,
     is_gone: Arc<AtomicBool>,

@@ -12,7 +12,7 @@ use super::super::{
 #[derive(Clone, Copy)]
 pub(crate) struct PrintedPair {
     pub(crate) site: Site,
-    /// Columns of table 2.
+    /// Columns of Table 2.
     pub(crate) columns: [usize; 2],
     pub(crate) images: [ResidualMoments; 2],
 }
@@ -145,38 +145,38 @@ fn remarks() -> Vec<Comparison> {
     ]
 }
 
-const FROM: &str = "circular orbits, emission angles of table 2 at the ground, noise of one line, clock errors that cause the published means";
+const FROM: &str = "circular orbits, emission angles of Table 2 at the ground, noise of one line, clock errors that cause the published means";
 
 pub(super) static ROWS: [Row; 5] = [
     Row {
         id: "S05-49",
         kind: Kind::ClosedLoop,
-        place: "table 5",
+        place: "Table 5",
         what: "reprojection residuals at Eos, 162 points",
         account: Account::InPart {
             from: FROM,
             ours: || table(0),
         },
-        note: "The size of the disagreement is a closed loop; its distribution between the images and its across-track \
-               part follow from the geometry. σ x results from kernels of two phases. In areograph, y has the opposite \
-               direction; it is reversed here.",
+        note: "The size of the disagreement is an input (closed loop); its distribution between the images and its \
+               across-track part follow from the geometry. The published σ x results from kernels of two mission \
+               phases. In areograph, y has the opposite direction; it is reversed here.",
     },
     Row {
         id: "S05-50",
         kind: Kind::ClosedLoop,
-        place: "table 5",
+        place: "Table 5",
         what: "reprojection residuals at Gusev, 154 points",
         account: Account::InPart {
             from: FROM,
             ours: || table(1),
         },
-        note: "As for S05-49. With weights in focal-plane pixels, image 2 receives more than half; in the paper, it \
-               receives less (S05-52).",
+        note: "As for S05-49. With weights in focal-plane pixels, image 2 receives more than half of the disagreement; \
+               in the paper, it receives less (S05-52).",
     },
     Row {
         id: "S05-51",
         kind: Kind::ClosedLoop,
-        place: "table 5",
+        place: "Table 5",
         what: "reprojection residuals at Isidis, 41 points",
         account: Account::InPart {
             from: FROM,
@@ -187,26 +187,26 @@ pub(super) static ROWS: [Row; 5] = [
     Row {
         id: "S05-52",
         kind: Kind::Arithmetic,
-        place: "table 5",
+        place: "Table 5",
         what: "distribution of the disagreement between the images, |M x1 / M x2|",
         account: Account::Explained {
             from: "(pixel 1 / pixel 2)² · line spacing 2 / line spacing 1, pixels on the ground; for the law without \
                    ranges, summing factors instead of pixels",
             ours: sharing,
         },
-        note: "The published values follow a law that ignores the slant range; only this page computes it. areograph \
-               uses weights in focal-plane pixels, whose size on the ground depends on the range; no value of \
-               `intersection.weighting` reproduces the published values.",
+        note: "The published values follow a law that ignores the slant range; only this page evaluates this law. \
+               areograph uses weights in focal-plane pixels, whose size on the ground depends on the range; no value \
+               of `intersection.weighting` reproduces the published values.",
     },
     Row {
         id: "S05-53",
         kind: Kind::Arithmetic,
-        place: "text on table 5",
+        place: "text on Table 5",
         what: "x up to 51 px, y about 4 px; σ x below 1 px, except 17 and 10 at Eos",
         account: Account::Agrees {
-            from: "M + σ of table 5",
+            from: "M + σ of Table 5",
             ours: remarks,
         },
-        note: "The published value is a sum, not the root of a sum of squares.",
+        note: "The published 51 and 4 px are sums, not roots of sums of squares.",
     },
 ];

@@ -19,7 +19,7 @@ struct Printed {
     pointing: [[f64; 3]; 2],
 }
 
-/// The table, in the order of table 2.
+/// The table, in the order of Table 2.
 const TABLE_4: [Printed; 6] = [
     Printed {
         position_m: [["29.035", "23.662", "8.762"], ["0.001", "0.019", "0.051"]],
@@ -119,7 +119,7 @@ fn e04_01275() -> Vec<Comparison> {
         ..image.scene()
     };
     let length_m = as_printed.position_rmse_m(1).norm();
-    let of = "order 1, length with the 7424 lines of table 2, m";
+    let of = "order 1, length with the 7424 lines of Table 2, m";
     all.push(derived(of, fixed(printed_m(1, 1).norm(), 2), length_m, 2).shown());
     all
 }
@@ -278,18 +278,19 @@ pub(super) static ROWS: [Row; 11] = [
     Row {
         id: "S05-31",
         kind: Kind::Evidence,
-        place: "table 4",
+        place: "Table 4",
         what: "RMSE of E02-02855",
         account: Account::InPart {
-            from: "circular orbit over the site, 31 samples, sum of squares over 31",
+            from: "circular orbit over the site, 31 samples, sum of squares divided by 31",
             ours: || sound(0, [TWO_PERCENT, TWO_PERCENT, TWO_PERCENT, ONE_PERCENT]),
         },
-        note: "For the second order, rounding to three published digits leaves an uncertainty of 4 % in the length. For pointing, see S05-32.",
+        note: "For the second order, rounding to three decimals leaves a standard deviation of up to 4 % in the \
+               lengths of S05-31 to S05-35. For pointing, see S05-32.",
     },
     Row {
         id: "S05-32",
         kind: Kind::Evidence,
-        place: "table 4",
+        place: "Table 4",
         what: "order of the pointing angles",
         account: Account::Explained {
             from: "exact nadir tracking on the orbit of the nadir images: residuals of the angles from a straight \
@@ -297,27 +298,28 @@ pub(super) static ROWS: [Row; 11] = [
             ours: orders_of_angles,
         },
         note: "The angles in the table of Shan, Lee & Yoon 2002 have the order 3-2-1, which would cause residuals of \
-               92″ for E02-02016, where 3.2″ is published. The order is not stated: 1-2-3, 2-1-3 and 3-2-1 are \
-               excluded; with ω, φ, κ about X, Y, Z, only 2-3-1 and 3-1-2 remain. Pointing in this table is attitude \
-               jitter in unknown angles, so only sizes can be compared.",
+               92″ for E02-02016, where 3.2″ is published. The paper of 2005 does not state the order: 1-2-3, 2-1-3 \
+               and 3-2-1 are excluded. With ω, φ, κ about X, Y, Z, 1-3-2 would cause 1.4″ in φ of E02-02016, where \
+               0.9″ is published; only 2-3-1 and 3-1-2 remain. The residuals of pointing in this table result from \
+               attitude jitter, in angles of unknown order, so only their sizes can be compared.",
     },
     Row {
         id: "S05-33",
         kind: Kind::ClosedLoop,
-        place: "table 4",
+        place: "Table 4",
         what: "RMSE of E04-01275",
         account: Account::InPart {
             from: "as for S05-31, 8064 lines",
             ours: e04_01275,
         },
-        note: "This row determines the number of lines: the 7424 lines of table 2 give 9.7 m, whereas 11.4 m follows \
+        note: "This row determines the number of lines: the 7424 lines of Table 2 give 9.7 m, whereas 11.4 m follows \
                from the published values. The length is therefore not evidence, but its distribution among X, Y and Z \
                is.",
     },
     Row {
         id: "S05-34",
         kind: Kind::Evidence,
-        place: "table 4",
+        place: "Table 4",
         what: "RMSE of E02-00665",
         account: Account::InPart {
             from: "as for S05-31, the header's 10496 lines",
@@ -328,7 +330,7 @@ pub(super) static ROWS: [Row; 11] = [
     Row {
         id: "S05-35",
         kind: Kind::Evidence,
-        place: "table 4",
+        place: "Table 4",
         what: "RMSE of E02-01453",
         account: Account::InPart {
             from: "as for S05-31",
@@ -339,7 +341,7 @@ pub(super) static ROWS: [Row; 11] = [
     Row {
         id: "S05-36",
         kind: Kind::Evidence,
-        place: "table 4",
+        place: "Table 4",
         what: "RMSE of E02-01301",
         account: Account::Explained {
             from: "as for S05-31",
@@ -351,7 +353,7 @@ pub(super) static ROWS: [Row; 11] = [
     Row {
         id: "S05-37",
         kind: Kind::Evidence,
-        place: "table 4",
+        place: "Table 4",
         what: "RMSE of E02-02016",
         account: Account::Explained {
             from: "as for S05-31",
@@ -369,15 +371,15 @@ pub(super) static ROWS: [Row; 11] = [
             ours: sampling,
             test: "tests/commands/mission.rs::orientation_comes_back",
         },
-        note: "These are 31 instants, including both ends.",
+        note: "The 30 intervals are bounded by 31 instants, including both ends.",
     },
     Row {
         id: "S05-39",
         kind: Kind::Arithmetic,
-        place: "text on table 4",
+        place: "text on Table 4",
         what: "first order: up to 29 m and 7″; second order: millimetres and at most 5″",
         account: Account::Explained {
-            from: "the rows of table 4",
+            from: "the rows of Table 4",
             ours: remarks,
         },
         note: "Second-order residuals reach 51 mm at Eos and Gusev, and 2.3 m at Isidis.",
@@ -385,7 +387,7 @@ pub(super) static ROWS: [Row; 11] = [
     Row {
         id: "S05-40",
         kind: Kind::Arithmetic,
-        place: "text on table 4",
+        place: "text on Table 4",
         what: "5″ on the ground",
         account: Account::Agrees {
             from: "380 km",
@@ -396,12 +398,12 @@ pub(super) static ROWS: [Row; 11] = [
     Row {
         id: "S05-41",
         kind: Kind::Arithmetic,
-        place: "text on table 4",
+        place: "text on Table 4",
         what: "improvement of pointing by the second order",
         account: Account::Explained {
-            from: "the rows of table 4, length of ω, φ, κ",
+            from: "the rows of Table 4, length of ω, φ, κ",
             ours: gain,
         },
-        note: "Two of six images improve by 30–40 %; single angles improve by 0 to 72 %.",
+        note: "The pointing of two of six images improves by 30–40 %; individual angles improve by 0 to 72 %.",
     },
 ];

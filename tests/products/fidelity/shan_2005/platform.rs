@@ -26,7 +26,7 @@ fn registration_uncertainty() -> Vec<Comparison> {
         .map(|image| image.shot_spacing_m.parse::<f64>().unwrap());
     let mean_m = spacings.sum::<f64>() / TABLE_2.len() as f64;
     vec![
-        number("mean MOLA GSD of table 2, m", "325", mean_m, 2).within(3.0),
+        number("mean MOLA GSD of Table 2, m", "325", mean_m, 2).within(3.0),
         derived(
             "equivalent clock error, s",
             "not published",
@@ -161,7 +161,7 @@ pub(super) static ROWS: [Row; 16] = [
         place: "abstract, results, conclusions",
         what: "along-track uncertainty of the registration: one MOLA GSD, nearly constant within an image",
         account: Account::Agrees {
-            from: "MOLA GSD of table 2; ground speed of a circular orbit",
+            from: "MOLA GSD of Table 2; ground speed of a circular orbit",
             ours: registration_uncertainty,
         },
         note: "The published 325 m is a rounded mean. As a clock error, it corresponds to 0.107 s; the 0.117 s of the \
@@ -170,7 +170,7 @@ pub(super) static ROWS: [Row; 16] = [
     Row {
         id: "S05-02",
         kind: Kind::Constants,
-        place: "table 1",
+        place: "Table 1",
         what: "altitude about 370 km, inclination",
         account: Account::Explained {
             from: "the circular orbit of the rows below",
@@ -182,7 +182,7 @@ pub(super) static ROWS: [Row; 16] = [
     Row {
         id: "S05-03",
         kind: Kind::Constants,
-        place: "table 1",
+        place: "Table 1",
         what: "period",
         account: Account::Agrees {
             from: "2π√(a³/GM)",
@@ -193,7 +193,7 @@ pub(super) static ROWS: [Row; 16] = [
     Row {
         id: "S05-04",
         kind: Kind::Constants,
-        place: "table 1",
+        place: "Table 1",
         what: "velocity",
         account: Account::Agrees {
             from: "√(GM/a), and the same relative to the rotating surface",
@@ -204,18 +204,18 @@ pub(super) static ROWS: [Row; 16] = [
     Row {
         id: "S05-05",
         kind: Kind::Constants,
-        place: "table 1",
+        place: "Table 1",
         what: "revisit",
         account: Account::Agrees {
             from: "revolutions of 7064 s in 7 sols of 88 775.244 s, rounded to a whole number",
             ours: revisit,
         },
-        note: "These are 88 revolutions.",
+        note: "Seven sols contain 88 revolutions.",
     },
     Row {
         id: "S05-06",
         kind: Kind::Constants,
-        place: "table 1",
+        place: "Table 1",
         what: "MOC narrow angle: detectors, focal length",
         account: Account::Input {
             from: "config/instruments/moc_na.toml",
@@ -227,7 +227,7 @@ pub(super) static ROWS: [Row; 16] = [
     Row {
         id: "S05-07",
         kind: Kind::Constants,
-        place: "table 1",
+        place: "Table 1",
         what: "MOC narrow angle: resolution, field of view",
         account: Account::Agrees {
             from: "config/instruments/moc_na.toml, 370 km",
@@ -238,19 +238,19 @@ pub(super) static ROWS: [Row; 16] = [
     Row {
         id: "S05-08",
         kind: Kind::Constants,
-        place: "table 1",
+        place: "Table 1",
         what: "MOC wide angle",
         account: Account::Explained {
             from: "config/instruments/moc_wa_red.toml and moc_wa_blue.toml, 370 km",
             ours: wide_angle,
         },
-        note: "The paper does not use this camera. The instrument files contain the focal lengths that belong to the \
-               distortion of each camera, 11.2 and 10.9 mm; 280 m would require an altitude of 450 km.",
+        note: "The paper does not use these cameras. The instrument files contain the focal length that belongs to the \
+               distortion of each camera, 11.2 mm for both; 280 m would require an altitude of 450 km.",
     },
     Row {
         id: "S05-09",
         kind: Kind::Constants,
-        place: "table 1",
+        place: "Table 1",
         what: "MOLA: 1064 nm, 10 Hz",
         account: Account::Input {
             from: "20 shots in the 2 s of a PEDR frame",
@@ -262,7 +262,7 @@ pub(super) static ROWS: [Row; 16] = [
     Row {
         id: "S05-10",
         kind: Kind::Arithmetic,
-        place: "table 1",
+        place: "Table 1",
         what: "laser spot",
         account: Account::Explained {
             from: "0.4 mrad and 370 km of the same table",
@@ -273,24 +273,24 @@ pub(super) static ROWS: [Row; 16] = [
     Row {
         id: "S05-11",
         kind: Kind::Constants,
-        place: "table 1",
+        place: "Table 1",
         what: "range resolution",
         account: Account::Agrees {
             from: "half the distance that light travels in 2.5 ns",
             ours: range_resolution,
         },
-        note: "2.5 ns is the resolution of MOLA's 400 MHz counter; the paper does not state it.",
+        note: "2.5 ns is the resolution of MOLA's 400 MHz counter; the paper does not state this resolution.",
     },
     Row {
         id: "S05-12",
         kind: Kind::Constants,
-        place: "table 1",
+        place: "Table 1",
         what: "spacing along the track, about 330 m",
         account: Account::Explained {
             from: "ground speed of a circular orbit, 0.1 s",
             ours: along_track,
         },
-        note: "330 m is neither one of the two spacings in table 2 nor a spacing of real shots (S05-65).",
+        note: "330 m is neither one of the two spacings in Table 2 nor a spacing of real shots (S05-65).",
     },
     Row {
         id: "S05-13",
@@ -325,7 +325,7 @@ pub(super) static ROWS: [Row; 16] = [
             ours: clock_bias,
             test: "tests/commands/mission.rs::the_three_readings_of_the_clock_bias_differ_as_told",
         },
-        note: "Neither sign nor formula is published. The key `altimeter_clock.scope` offers three readings: `spk_lookup` \
+        note: "Neither sign nor formula is published. The key `altimeter_clock.scope` offers three interpretations: `spk_lookup` \
                (default), `both`, `rotation`.",
     },
     Row {
@@ -336,7 +336,7 @@ pub(super) static ROWS: [Row; 16] = [
         account: Account::Data {
             printed: "0–50 m apart, mostly across the track; NAV nearest to the mean",
         },
-        note: "Closed loop: the shifts of synthetic orbits are recovered to a metre, and the orbit nearest to their \
+        note: "Closed loop: the shifts of synthetic orbits are recovered to within 1 m, and the orbit nearest to their \
                mean is chosen (tests/commands/compare_kernels.rs).",
     },
 ];

@@ -57,7 +57,7 @@ pub(super) static ROWS: [Row; 3] = [
     Row {
         id: "S05-28",
         kind: Kind::Evidence,
-        place: "table 3",
+        place: "Table 3",
         what: "range minus distance: shots, mean, standard deviation, m",
         account: Account::Data {
             printed: "E02-02855: 174, 0.637, 0.015; E04-01275: 76, −9.889, 0.739; E02-00665: 142, −2.044, 0.019; \
@@ -70,10 +70,10 @@ pub(super) static ROWS: [Row; 3] = [
     Row {
         id: "S05-29",
         kind: Kind::Arithmetic,
-        place: "text on table 3",
+        place: "text on Table 3",
         what: "standard deviations, means, single shots",
         account: Account::Explained {
-            from: "the rows of table 3",
+            from: "the rows of Table 3",
             ours: remarks,
         },
         note: "The paper publishes observations, not limits. Three of six means are below 4 m.",
@@ -84,7 +84,7 @@ pub(super) static ROWS: [Row; 3] = [
         place: "conclusions",
         what: "off nadir to 25 m, nadir about 5 m",
         account: Account::Explained {
-            from: "the rows of table 3",
+            from: "the rows of Table 3",
             ours: conclusions,
         },
         note: "The published 5 m is the largest residual of a single shot, not a mean.",

@@ -87,7 +87,7 @@ fn same_place() -> Vec<Comparison> {
     let spacing_lines = (lines[141] - lines[0]) / 141.0;
     let shot_s = 305.0 / super::super::table_2::ground_speed_m_s(true);
     let shifted = shot_s / GUSEV.line_period_s() / spacing_lines;
-    vec![number("footprints for one spacing of time", "1", shifted, 3).within(5e-3)]
+    vec![number("footprints for one shot interval", "1", shifted, 3).within(5e-3)]
 }
 
 fn measuring() -> Vec<Comparison> {
@@ -114,7 +114,7 @@ pub(super) static ROWS: [Row; 7] = [
             ours: tolerance,
             test: "tests/stages/registration.rs::iterations_are_counted_for_every_point_within_the_lines",
         },
-        note: "The tolerance is one line in x.",
+        note: "In x, one pixel is one line.",
     },
     Row {
         id: "S05-43",
@@ -125,8 +125,8 @@ pub(super) static ROWS: [Row; 7] = [
             from: "circular orbit, both images, 174 points at 305 m",
             ours: eos,
         },
-        note: "The off-nadir image alone requires 2.9. The paper does not state whether the sum was divided by 174 or \
-               348. Eq. 4 requires fewer iterations in each image.",
+        note: "The off-nadir image alone requires 2.9 iterations. The paper does not state whether the sum was divided \
+               by 174 or 348. In each image, eq. 4 requires fewer iterations than the frame-first method.",
     },
     Row {
         id: "S05-44",
@@ -138,7 +138,7 @@ pub(super) static ROWS: [Row; 7] = [
             ours: gusev,
         },
         note: "The row refers to one image, not to a pair. The frame-first method requires 11 % more iterations than \
-               published; the paper does not state its initial values.",
+               published; the paper does not state the initial values of the iterations.",
     },
     Row {
         id: "S05-45",
@@ -171,7 +171,8 @@ pub(super) static ROWS: [Row; 7] = [
             from: "circular orbit, E02-00665, a clock error equal to the time between two shots",
             ours: same_place,
         },
-        note: "An inserted time shift is recovered as one footprint. The paper compared the images visually.",
+        note: "An inserted time shift of one shot interval is recovered as a shift of one footprint. The paper \
+               compared the images visually.",
     },
     Row {
         id: "S05-48",

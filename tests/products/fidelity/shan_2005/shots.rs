@@ -81,7 +81,7 @@ fn velocity() -> Vec<Comparison> {
 fn altitude() -> Vec<Comparison> {
     let range_km = PASSES[0].range_m / 1e3;
     vec![
-        number("altitude of table 1, km", "370", range_km, 1).departs(0.02 * 370.0),
+        number("altitude of Table 1, km", "370", range_km, 1).departs(0.02 * 370.0),
         number("H of eq. 9, km", "385", range_km, 1).share(0.02),
     ]
 }
@@ -104,7 +104,7 @@ pub(super) static ROWS: [Row; 7] = [
     Row {
         id: "S05-64",
         kind: Kind::Evidence,
-        place: "table 1",
+        place: "Table 1",
         what: "MOLA: 10 Hz",
         account: Account::Agrees {
             from: "times of real shots, orbit 18940",
@@ -115,30 +115,30 @@ pub(super) static ROWS: [Row; 7] = [
     Row {
         id: "S05-65",
         kind: Kind::Evidence,
-        place: "table 2",
+        place: "Table 2",
         what: "MOLA GSD of the pair at Gusev, m",
         account: Account::Agrees {
             from: "distances between real shots of both passes, just after the images",
             ours: spacing,
         },
-        note: "The spacing varies by 2 m with height and latitude. The 330 m of table 1 is neither of the two spacings (S05-12).",
+        note: "The spacing varies by 2 m with height and latitude. The 330 m of Table 1 is neither of the two spacings (S05-12).",
     },
     Row {
         id: "S05-66",
         kind: Kind::Evidence,
-        place: "table 2",
+        place: "Table 2",
         what: "MOLA profiles of the pair at Gusev, and days between them",
         account: Account::Explained {
             from: "orbits and times of the real passes closest in time to the images",
             ours: orbits,
         },
         note: "The paper states file names: a file is named after the first of its twelve orbits, and the passes are \
-               among these. The window of the shots begins after the end of the images.",
+               among these. The window of the shots begins after the end of each image.",
     },
     Row {
         id: "S05-67",
         kind: Kind::Evidence,
-        place: "table 1",
+        place: "Table 1",
         what: "period",
         account: Account::Agrees {
             from: "time between the two real passes divided by the number of orbits",
@@ -149,7 +149,7 @@ pub(super) static ROWS: [Row; 7] = [
     Row {
         id: "S05-68",
         kind: Kind::Evidence,
-        place: "table 1",
+        place: "Table 1",
         what: "velocity",
         account: Account::Agrees {
             from: "real shots of orbit 19053, held inertially: the footprint moves at the speed of the spacecraft",
@@ -160,7 +160,7 @@ pub(super) static ROWS: [Row; 7] = [
     Row {
         id: "S05-69",
         kind: Kind::Evidence,
-        place: "table 1, text on eq. 9",
+        place: "Table 1, text on eq. 9",
         what: "altitude about 370 km; height H 385 km",
         account: Account::InPart {
             from: "real ranges at nadir, orbit 18940",

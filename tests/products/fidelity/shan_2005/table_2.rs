@@ -141,7 +141,7 @@ fn durations() -> Vec<Comparison> {
     vec![
         number("mean imaging time, s", "12", mean_s(&as_printed), 2).within(0.5),
         derived(
-            "mean with the 8064 lines that table 4 requires, s",
+            "mean with the 8064 lines that Table 4 requires, s",
             "12",
             mean_s(&Printed::duration_s),
             2,
@@ -163,7 +163,7 @@ pub(super) static ROWS: [Row; 11] = [
     Row {
         id: "S05-17",
         kind: Kind::ClosedLoop,
-        place: "table 2",
+        place: "Table 2",
         what: "emission angle, °",
         account: Account::Input {
             from: "the synthetic mission, at the ground in the middle of the image",
@@ -176,19 +176,20 @@ pub(super) static ROWS: [Row; 11] = [
     Row {
         id: "S05-18",
         kind: Kind::ClosedLoop,
-        place: "table 2",
+        place: "Table 2",
         what: "start, UTC",
         account: Account::Input {
             from: "labels of the synthetic mission",
             ours: start,
             test: "tests/truth/scene_mission.rs::image_starts_are_the_published_times_to_the_clock_tick",
         },
-        note: "The times are rounded to 10 ms, which is 3 to 5 lines; the clock strings of labels are more precise.",
+        note: "The times are rounded to 10 ms, an error of at most 3 to 5 lines; the clock strings of labels are more \
+               precise.",
     },
     Row {
         id: "S05-19",
         kind: Kind::ClosedLoop,
-        place: "table 2",
+        place: "Table 2",
         what: "exposure time, ms",
         account: Account::Input {
             from: "exposure of a detector line times the summing factor",
@@ -201,7 +202,7 @@ pub(super) static ROWS: [Row; 11] = [
     Row {
         id: "S05-20",
         kind: Kind::ClosedLoop,
-        place: "table 2",
+        place: "Table 2",
         what: "summing factor",
         account: Account::Input {
             from: "labels of the synthetic mission",
@@ -213,44 +214,44 @@ pub(super) static ROWS: [Row; 11] = [
     Row {
         id: "S05-21",
         kind: Kind::ClosedLoop,
-        place: "table 2",
+        place: "Table 2",
         what: "lines of the header",
         account: Account::Input {
             from: "labels of the synthetic mission",
             ours: header_lines,
             test: "tests/truth/scene_mission.rs::the_images_are_flown_as_table_2_prints_them",
         },
-        note: "The paper contradicts itself: its table 4 requires 8064 lines for E04-01275 (S05-33). The synthetic \
+        note: "The paper contradicts itself: its Table 4 requires 8064 lines for E04-01275 (S05-33). The synthetic \
                image has 8064 lines, of which the published 7424 are delivered.",
     },
     Row {
         id: "S05-22",
         kind: Kind::ClosedLoop,
-        place: "table 2",
+        place: "Table 2",
         what: "lines and samples of the file",
         account: Account::Input {
             from: "the synthetic mission; samples are 2048 divided by the summing factor, rounded down to a multiple of 16",
             ours: file_size,
             test: "tests/truth/scene_mission.rs::the_images_are_flown_as_table_2_prints_them",
         },
-        note: "Three files have fewer lines than their header.",
+        note: "Three files have fewer lines than their headers state.",
     },
     Row {
         id: "S05-23",
         kind: Kind::Arithmetic,
-        place: "table 2",
+        place: "Table 2",
         what: "MOC GSD, m",
         account: Account::Agrees {
             from: "exposure time, ground speeds of nadir and of inertially held images",
             ours: pixel_size,
         },
-        note: "The published size applies along the track only.",
+        note: "The published pixel size applies only along the track.",
     },
     Row {
         id: "S05-24",
         kind: Kind::Constants,
-        place: "table 2",
-        what: "MOLA profiles, by their orbit",
+        place: "Table 2",
+        what: "MOLA profiles, identified by orbit",
         account: Account::Agrees {
             from: "the orbit of E02-00665, start times, 7064 s",
             ours: orbits,
@@ -260,18 +261,19 @@ pub(super) static ROWS: [Row; 11] = [
     Row {
         id: "S05-25",
         kind: Kind::Arithmetic,
-        place: "table 2",
+        place: "Table 2",
         what: "MOLA points",
         account: Account::Explained {
             from: "10 Hz times the imaging time",
             ours: shots,
         },
-        note: "Every image has fewer shots than its imaging time permits: some are missing. Their number requires data.",
+        note: "Every image has fewer shots than its imaging time permits: some are missing. Counting them requires \
+               data.",
     },
     Row {
         id: "S05-26",
         kind: Kind::Arithmetic,
-        place: "table 2",
+        place: "Table 2",
         what: "MOLA GSD, m",
         account: Account::Agrees {
             from: "0.1 s, ground speeds of nadir and of inertially held images",
@@ -282,12 +284,12 @@ pub(super) static ROWS: [Row; 11] = [
     Row {
         id: "S05-27",
         kind: Kind::Arithmetic,
-        place: "text on table 2",
+        place: "text on Table 2",
         what: "imaging time about 12 s; pairs less than 10 days apart, except Eos",
         account: Account::Agrees {
-            from: "lines and times of table 2",
+            from: "lines and times of Table 2",
             ours: durations,
         },
-        note: "The times are 7.8 to 17.8 s.",
+        note: "The imaging times are 7.8 to 17.8 s.",
     },
 ];

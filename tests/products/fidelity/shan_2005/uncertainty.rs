@@ -17,7 +17,7 @@ use super::{
 /// The mean pixel of the paper, metres.
 const PIXEL_M: f64 = 4.4;
 
-/// The budget of the printed table 5.
+/// The budget of the printed Table 5.
 fn budget() -> UncertaintyBudget {
     uncertainty_budget(&BudgetInput {
         sites: TABLE_5
@@ -212,7 +212,7 @@ pub(super) static ROWS: [Row; 10] = [
         place: "eq. 7",
         what: "D_Δx(EO)",
         account: Account::Agrees {
-            from: "table 5: squares averaged over the sites for each image, then added",
+            from: "Table 5: squares averaged over the sites for each image, then added",
             ours: along,
         },
         note: "Averaging D instead of its square gives 40.7. Eq. 7 adds the means of both images in quadrature. \
@@ -240,9 +240,10 @@ pub(super) static ROWS: [Row; 10] = [
             from: "S05-54 and S05-55",
             ours: ground,
         },
-        note: "This is the remainder of one MOLA spacing, estimated visually, after subtraction of S05-54; if means of \
-               opposite sign are added, it is 49.9 px. A planimetric error of a footprint moves both of its \
-               projections alike, so the remainder does not represent the accuracy of MOLA.",
+        note: "The paper estimated a misregistration of one MOLA spacing visually; D_Δx(MOLA) is the remainder after \
+               subtraction of S05-54 in quadrature. If means of opposite sign are added, the remainder is 49.9 px. A \
+               planimetric error of a footprint moves both of its projections alike, so the remainder does not \
+               represent the accuracy of MOLA.",
     },
     Row {
         id: "S05-57",
@@ -250,11 +251,11 @@ pub(super) static ROWS: [Row; 10] = [
         place: "eq. 7, across the track",
         what: "D_Δy(EO)",
         account: Account::Explained {
-            from: "table 5",
+            from: "Table 5",
             ours: across,
         },
         note: "The paper sums over both images along the track, as its eq. 7 states, and averages across the track. \
-               Products and report contain both results.",
+               The products and the report of areograph contain both results.",
     },
     Row {
         id: "S05-58",
@@ -265,8 +266,8 @@ pub(super) static ROWS: [Row; 10] = [
             from: "S05-54 and S05-57, 4.4 m",
             ours: plan,
         },
-        note: "D_p is the distance between the two footprints of one point, not a standard deviation of a point. \
-               According to eq. 5, it is larger (S05-54).",
+        note: "D_p is the distance between the positions of one point according to the two images, not a standard \
+               deviation of a point. According to eq. 5, it is larger (S05-54).",
     },
     Row {
         id: "S05-59",
@@ -274,7 +275,7 @@ pub(super) static ROWS: [Row; 10] = [
         place: "text on eq. 8",
         what: "mean pixel",
         account: Account::Agrees {
-            from: "table 2",
+            from: "Table 2",
             ours: mean_pixel,
         },
         note: "With the unrounded mean, D_p would be 182.2 m.",
@@ -285,7 +286,7 @@ pub(super) static ROWS: [Row; 10] = [
         place: "text on eq. 9",
         what: "height H and base B, across the track",
         account: Account::Agrees {
-            from: "table 1 of Shan, Lee & Yoon 2002 (Eos)",
+            from: "Table 1 of Shan, Lee & Yoon 2002 (Eos)",
             ours: height_and_base,
         },
         note: "One pair represents three sites: with the published emission angles, B would be 123 km at Eos, 154 km at \
@@ -311,8 +312,8 @@ pub(super) static ROWS: [Row; 10] = [
             from: "S05-57 and S05-61, 4.4 m",
             ours: height,
         },
-        note: "D_h is the same distance in height. If eq. 7 were applied across the track as it is along the track, \
-               D_h would be larger by a factor of √2.",
+        note: "D_h is likewise a distance, in height, not a standard deviation. If eq. 7 were applied across the track \
+               as it is along the track, D_h would be larger by a factor of √2.",
     },
     Row {
         id: "S05-63",

@@ -8,8 +8,8 @@ const TABLES: &str = "docs/guide/src/further_missions.md";
 const FIRST_SEEDS: [u32; 3] = [60_001, 70_001, 90_001];
 
 const INTRODUCTION: &str = "\
-A long test computes these tables (`tests/truth/truth/stated/further.rs`). Entries are ratios, with the share beyond three
-standard deviations in brackets.
+A long test computes these tables (`tests/truth/truth/stated/further.rs`). Entries are ratios, with the share of values
+beyond three standard deviations in parentheses.
 ";
 
 #[test]

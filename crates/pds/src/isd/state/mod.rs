@@ -72,13 +72,14 @@ const NAMES: [(&str, &str); 24] = [
 
 /// A state that cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, Cause)]
-#[cause(Input: "run csminit on the cube again, or configure the image by its support data (isd), or by label and kernels")]
+#[cause(Input: "run csminit on the cube again, or configure the image by its support data (isd) or by label and \
+ kernels")]
 pub(crate) enum StateError {
     #[error("state of the camera model: {0}")]
     Content(IsdError),
     #[error(
-        "the state belongs to the camera model {model}; expected {LINE_SCANNER}: frame, push-frame, radar and projected \
-         models have no detector line with its own times"
+        "the state belongs to the camera model {model}; expected {LINE_SCANNER}: frame, push-frame, radar and \
+         projected models are not supported"
     )]
     #[cause("configure the image by label and kernels, or omit the image")]
     Model { model: String },

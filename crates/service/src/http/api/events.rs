@@ -37,9 +37,9 @@ const LOOK: Duration = Duration::from_secs(15);
 /// An event: the data of a message, whose `event` is its kind and whose `id` is its number.
 #[derive(Debug, Serialize, ToSchema)]
 struct EventData {
-    /// Its number; later events have larger ones.
+    /// Its number; later events have larger numbers.
     seq: i64,
-    /// When.
+    /// Time of the event.
     at_utc: Instant,
     /// `job`, `stage`, `progress`, `run`, `root`, `night`, `alert`, `checked` or `config`.
     kind: String,
@@ -49,7 +49,7 @@ struct EventData {
     job: Option<i64>,
     /// The run that it concerns.
     run: Option<String>,
-    /// Further data, by its kind.
+    /// Further data, depending on the kind.
     data: Value,
 }
 

@@ -33,7 +33,7 @@ const SHOWN: [&str; 4] = [
 ];
 
 /// A product of a run: `path` as in its manifest, or `manifest.json`. The tag is the BLAKE3 of the content; ranges are
-/// supported. A product whose content does not have the hash of the manifest is withheld (409).
+/// supported. A product whose content does not match the hash in the manifest is withheld (409).
 #[utoipa::path(get, path = "/api/v1/runs/{run}/files/{*path}", tag = "runs", params(
     ("run" = String, Path, description = "Identifier of the run", pattern = "^[A-Za-z0-9_-]{1,64}$"),
     ("path" = String, Path, description = "Path of a product as listed in the manifest; may contain /"),

@@ -40,9 +40,9 @@ pub(super) struct JobLine {
     priority: Priority,
     /// Number of its newest attempt, 0 before the first.
     attempt: i64,
-    /// Attempts that failed and count.
+    /// Number of failed attempts that count towards the limit.
     failures: i64,
-    /// It waits until this time.
+    /// Time until which it waits.
     not_before_utc: Option<Instant>,
     /// Whether every stage runs, including stored ones.
     force: bool,
@@ -95,10 +95,10 @@ pub(super) struct JobsWanted {
     /// Maximum number of items, by default 50.
     #[param(minimum = 1, maximum = 200)]
     limit: Option<u32>,
-    /// Of this site.
+    /// Only jobs of this site.
     #[param(pattern = "^[A-Za-z0-9_-]{1,64}$")]
     site: Option<String>,
-    /// In this state.
+    /// Only jobs in this state.
     #[param(inline)]
     state: Option<JobState>,
 }
@@ -143,9 +143,9 @@ struct JobCause {
     old_blake3: Option<String>,
     /// BLAKE3 of its content now.
     new_blake3: Option<String>,
-    /// As text.
+    /// Its description.
     detail: String,
-    /// When.
+    /// Its time.
     at_utc: Instant,
 }
 
@@ -158,7 +158,7 @@ struct JobDetail {
     causes: Vec<JobCause>,
     /// Its attempts, the newest first, at most 100.
     attempts: Vec<Attempt>,
-    /// What they published.
+    /// Runs that its attempts published.
     runs: Vec<Run>,
 }
 

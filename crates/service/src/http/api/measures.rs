@@ -114,7 +114,7 @@ fn of_jobs(totals: &Totals, now_ms: i64) -> Vec<Gauge> {
     gauges.extend([
         Gauge::plain(
             "oldest_queued_job_seconds",
-            "Age of the oldest queued job, 0 without one",
+            "Age of the oldest queued job; 0 if no job is queued",
             age_s,
         ),
         Gauge::plain(
@@ -166,7 +166,7 @@ fn of_sites(standing: &Standing, waits: &[Wait]) -> Vec<Gauge> {
         ),
         Gauge::plain(
             "inputs_lost",
-            "Files for which sites wait",
+            "Missing files for which sites wait",
             waits.len() as f64,
         ),
     ]);

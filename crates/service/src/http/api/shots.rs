@@ -73,8 +73,8 @@ pub(super) struct Polygon {
     coordinates: Vec<Vec<[f64; 2]>>,
 }
 
-/// Shots of the current runs in a box; refused (409) while footprints of one of them are damaged. The header Areograph-Complete states whether they are complete, or limited to
-/// the 1,000,000 rows of an answer.
+/// Shots of the current runs in a box. The request is refused (409) while footprints of one of these runs are damaged. The
+/// header Areograph-Complete states whether the answer contains all shots, or is limited to 1,000,000 rows.
 #[utoipa::path(get, path = "/api/v1/shots", tag = "shots", params(BoxWanted), responses(
     (status = 200, content(
         (serde_json::Value = "application/geo+json"), (String = "text/csv"), (Vec<u8> = "application/vnd.apache.parquet"),
@@ -146,10 +146,10 @@ fn corners_of_box(text: &str) -> Result<Vec<[f64; 2]>, Problem> {
 fn corners_of_polygon(polygon: Polygon) -> Result<Vec<[f64; 2]>, Problem> {
     let wrong = |text: String| Err(Problem::bad_request(text));
     if polygon.kind != "Polygon" {
-        return wrong("type is Polygon.".to_owned());
+        return wrong("type is invalid; expected Polygon.".to_owned());
     }
     let Ok([mut ring]) = <[_; 1]>::try_from(polygon.coordinates) else {
-        return wrong("expected coordinates with one ring; holes are not supported.".to_owned());
+        return wrong("coordinates is invalid; expected one ring, without holes.".to_owned());
     };
     // GeoJSON repeats the first corner at the end.
     if ring.len() > 1 && ring.first() == ring.last() {
@@ -261,7 +261,7 @@ fn form(headers: &HeaderMap) -> Result<(&'static str, &'static str), Problem> {
     known.into_iter().next().ok_or_else(|| {
         Problem::new(
             StatusCode::NOT_ACCEPTABLE,
-            "Shots come as application/geo+json, text/csv or application/vnd.apache.parquet.",
+            "Shots are available as application/geo+json, text/csv or application/vnd.apache.parquet.",
         )
     })
 }

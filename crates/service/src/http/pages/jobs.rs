@@ -205,7 +205,7 @@ fn job_lead(job: &Job, newest: Option<&Attempt>, times: &Times) -> Markup {
                 (job.state) " since " (times.at(Instant(job.changed_ms))) "."
                 @if job.force { " Every stage runs." }
                 @if job.cancel_asked && !job.state.is_final() { " Cancellation was requested." }
-                @if job.state == JobState::Waiting { " Tried again " (times.age(Instant(job.not_before_ms))) "." }
+                @if job.state == JobState::Waiting { " Next attempt " (times.age(Instant(job.not_before_ms))) "." }
             }
             @if let Some(text) = outcome_text(job) { p { (prose(text)) } }
             @if let Some(attempt) = progress {

@@ -173,7 +173,7 @@ fn freshness(site: &Site, times: &Times) -> Markup {
         @else if let Some(since) = site.stale_since_utc {
             "Stale since " (times.at(since)) ": " (prose(site.stale_because.as_deref().unwrap_or("its inputs changed")))
         }
-        @else if site.current_run.is_some() { "Fresh." @if let Some(note) = &site.note { " Last decision: " (prose(note)) "." } }
+        @else if site.current_run.is_some() { "Up to date." @if let Some(note) = &site.note { " Last decision: " (prose(note)) "." } }
         @else { (prose(site.note.as_deref().unwrap_or("No run yet."))) }
     }
 }

@@ -63,7 +63,7 @@ pub(super) fn timeline(rows: &[Row]) -> Markup {
             }
             ul class="keys" { li { i class="k0" {} "positions" } li { i class="k1" {} "attitude" } }
             figcaption {
-                "Times are TDB, about a minute ahead of UTC. Empty intervals are gaps; narrower gaps are listed in the "
+                "Times are TDB, about a minute ahead of UTC. Empty intervals are gaps; gaps too narrow for the plot are listed in the "
                 a href="/api/v1/kernels" { "interface for programs" } "."
             }
         }
