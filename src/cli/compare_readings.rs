@@ -33,15 +33,15 @@ pub(super) struct Arguments {
     #[arg(required = true, value_name = "OUT")]
     folders: Vec<PathBuf>,
     /// Size of large errors of single images, as a standard deviation of line times, 1e-3 to 1e5; by default
-    /// that of `adjustment.line_time_sigma_ms`.
+    /// the default of `adjustment.line_time_sigma_ms`.
     #[arg(long, value_name = "MILLISECONDS", value_parser = sigma)]
     line_time_sigma_ms: Option<f64>,
     /// Size of small errors of single images, as a standard deviation of rotations, 1e-3 to 1e5; by default
-    /// that of `adjustment.attitude_clock_rotation_sigma_arcsec`.
+    /// the default of `adjustment.attitude_clock_rotation_sigma_arcsec`.
     #[arg(long, value_name = "ARCSECONDS", value_parser = sigma)]
     rotation_sigma_arcsec: Option<f64>,
     /// A priori standard deviation of the offset of the attitude clock, 1e-3 to 1e5; by default
-    /// that of `adjustment.attitude_clock_sigma_s`.
+    /// the default of `adjustment.attitude_clock_sigma_s`.
     #[arg(long, value_name = "SECONDS", value_parser = sigma)]
     attitude_clock_sigma_s: Option<f64>,
     /// Print JSON, with all pairs.

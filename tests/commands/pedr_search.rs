@@ -18,7 +18,7 @@ use std::{
 use areograph::body::Datum;
 use arrow_array::RecordBatch;
 use arrow_array::cast::AsArray as _;
-use arrow_array::types::{Float64Type, UInt32Type};
+use arrow_array::types::{Float32Type, Float64Type, UInt32Type};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use serde_json::Value;
 use track::{FRAMES, write};
@@ -118,21 +118,34 @@ fn every_format_has_the_same_rows_in_the_order_of_time() {
         (files.value(0), files.value(rows - 1)),
         ("AP19030L.B", "ap19020k.b")
     );
-    let bbox = column("bbox");
-    let west = bbox.as_struct().column_by_name("xmin").unwrap();
-    let longitudes = column("longitude_deg");
-    let longitudes = longitudes.as_primitive::<Float64Type>();
-    let west = west.as_primitive::<Float64Type>();
+    let (boxes, points, longitudes) = (column("bbox"), column("geometry"), column("longitude_deg"));
+    let side = |name: &str| {
+        let sides = boxes.as_struct().column_by_name(name).unwrap();
+        sides.as_primitive::<Float32Type>().clone()
+    };
+    let [west, south, east, north] = ["xmin", "ymin", "xmax", "ymax"].map(side);
     for row in 0..rows {
+        // Well-known binary: byte order, type, two coordinates.
+        let point = &points.as_binary::<i32>().value(row)[5..];
+        let [x, y] =
+            [&point[..8], &point[8..]].map(|axis| f64::from_le_bytes(axis.try_into().unwrap()));
+        for (axis, least, most) in [(x, &west, &east), (y, &south, &north)] {
+            let (least, most) = (f64::from(least.value(row)), f64::from(most.value(row)));
+            assert!((least..=most).contains(&axis), "row {row}: {axis}");
+            // Two neighbours in single precision, below 256 degrees.
+            assert!(
+                most - least <= 2.0_f64.powi(-16),
+                "row {row}: {least} {most}"
+            );
+        }
+        let longitude = longitudes.as_primitive::<Float64Type>().value(row);
         // Degrees of either turn, to their rounding.
+        let turns = (longitude - x) / 360.0;
         assert!(
-            ((longitudes.value(row) - west.value(row)).rem_euclid(360.0))
-                .min(1.0)
-                .fract()
-                .abs()
-                < 1e-9
+            (turns - turns.round()).abs() < 1e-11,
+            "row {row}: {longitude} {x}"
         );
-        assert!((-170.0..=170.0).contains(&west.value(row)));
+        assert!((-170.0..=170.0).contains(&x));
     }
     let mut reader = csv::Reader::from_path(&csv).unwrap();
     let names = reader.headers().unwrap().clone();

@@ -395,7 +395,7 @@ fn what_cannot_be_trusted_is_said() {
     let correlated = &site.adjusted.summary.correlated;
     let most = correlated.iter().map(|of| of.2.abs()).fold(0.0, f64::max);
     if correlated.is_empty() {
-        assert!(words.contains("No two unknowns of the adjustment correlate by more than 0.95."));
+        assert!(words.contains("No correlation of two unknowns of the adjustment exceeds 0.95 in magnitude."));
     } else {
         let rows = table(&page, "Largest correlations");
         assert_eq!(rows.len(), correlated.len().min(12));
@@ -627,7 +627,7 @@ fn many_blunders_are_counted_and_their_names_stay_text() {
     assert!(text.contains("And 13 more.") && text.contains("&lt;i&gt;19") && !text.contains("<i>"));
     assert!(text.contains("−7.250 ± 0.125") && text.contains("gusev &amp; co"));
     assert!(text.contains("−42.50 ± 1.00"));
-    assert!(text.contains("No two unknowns of the adjustment correlate"));
+    assert!(text.contains("No correlation of two unknowns of the adjustment"));
 }
 
 #[test]

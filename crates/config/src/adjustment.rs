@@ -34,8 +34,8 @@ const SIGMAS_OF_POWERS: Several<Number, 9> = several(SIGMA_OR_FREE, "9 numbers")
 const SIGMAS_OF_TIME: Several<Number, 3> = several(SIGMA_OR_FREE, "3 numbers");
 
 declare_table! {
-    /// Combined adjustment of images, laser shots and tie points. Standard deviations are from Yoon & Shan 2004 where
-    /// that paper gives them.
+    /// Combined adjustment of images, laser shots and tie points. Defaults that cite Yoon & Shan 2004 are
+    /// the standard deviations of that paper.
     pub struct AdjustmentConfig: Deserialize {
         /// Control of the adjustment. The published model (Yoon & Shan 2004) is provided for comparison: image
         /// coordinates of footprints, computed from the orientations under adjustment, hold these orientations fixed.

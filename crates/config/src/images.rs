@@ -49,7 +49,7 @@ declare_table! {
             .example_in(1, r#""M04-02852""#),
         /// PDS3 or ISIS label, attached or detached. For HRSC on Mars Express: the level-2 file of the archive
         /// (`h….img`), whose rows contain the line times, together with `instrument`; a label without its image also
-        /// requires `exposures`. An HRSC file with fewer samples than detector pixels requires `first_detector` (ISIS
+        /// requires `exposures`. An HRSC file with fewer samples than detector elements requires `first_detector` (ISIS
         /// and ALE assume pixel 0).
         #[serde(skip)]
         label: Option<PathBuf> = key(FILE).example(r#""../labels/e0202855.lbl""#),
@@ -150,7 +150,7 @@ declare_table! {
         line_period_s as "line_period_ms" = milliseconds("3.8568"),
         /// Number of detector lines summed along the track (narrow angle: up to 8).
         downtrack_summing = key(SUMMING).example_in(1, "8"),
-        /// Number of detector pixels summed across the track.
+        /// Number of detector elements summed across the track.
         crosstrack_summing = key(SUMMING).example_in(1, "8"),
         /// Number of exposed lines according to the image header, for the time model; the exposure of all lines must
         /// take less than 600 s.
@@ -159,7 +159,7 @@ declare_table! {
         lines_delivered = key(whole_from_to(1, LINES_MAX)).example_in(1, "1536"),
         /// Number of samples per line.
         samples = key(whole_from_to(1, DETECTORS_MAX)).example_in(1, "256"),
-        /// First detector pixel, counted from 0 (`EDIT_MODE_ID`).
+        /// First detector element, counted from 0 (`EDIT_MODE_ID`).
         first_detector = key(whole_from_to(0, DETECTORS_MAX - 1)).example_in(1, "0"),
     }
     check agree

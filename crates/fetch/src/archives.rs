@@ -310,9 +310,7 @@ impl Archives {
         }
         for (orbit, utc) in &self.pedr.orbits {
             if Utc::parse(utc).is_none() {
-                return wrong(format!(
-                    "the time of orbit {orbit} is {utc:?}; expected UTC"
-                ));
+                return wrong(format!("orbit {orbit} has time {utc:?}; expected UTC"));
             }
         }
         if !self.pedr.orbits.is_sorted_by_key(|(orbit, _)| *orbit) {
@@ -330,15 +328,11 @@ impl Archives {
             .iter()
             .any(|seconds| !(0.001..=86_400.0).contains(seconds))
         {
-            return wrong(
-                "a time in network or shots is out of range; expected 0.001 to 86400 s".to_owned(),
-            );
+            return wrong("a time in network or shots is not 0.001 to 86400 s".to_owned());
         }
         if network.attempts == 0 || !(1..=8).contains(&network.connections_per_host) {
-            return wrong(
-                "network.attempts is below 1, or network.connections_per_host is outside 1 to 8"
-                    .to_owned(),
-            );
+            let what = "network.attempts is below 1, or connections_per_host is outside 1 to 8";
+            return wrong(what.to_owned());
         }
         if self.contact.contains(|letter: char| letter.is_control()) {
             return wrong("contact contains a control character".to_owned());

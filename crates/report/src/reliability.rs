@@ -220,11 +220,11 @@ pub(super) fn correlations(summary: &AdjustmentSummary) -> Markup {
     let mut all: Vec<_> = summary.correlated.iter().enumerate().collect();
     all.sort_by(|(_, a), (_, b)| b.2.abs().total_cmp(&a.2.abs()));
     let Some((_, (first, second, largest))) = all.first() else {
-        return paragraph("No two unknowns of the adjustment correlate by more than 0.95.");
+        return paragraph("No correlation of two unknowns of the adjustment exceeds 0.95 in magnitude.");
     };
     let sum = if *largest < 0.0 { "sum" } else { "difference" };
     let words = format!(
-        "{} correlate by more than 0.95, most of all {first} and {second} ({}): only the {sum} of the two unknowns, \
+        "{} are correlated by more than 0.95 in magnitude, {first} and {second} most ({}): only the {sum} of the two unknowns, \
          each divided by its σ, is well determined. Do not interpret the individual values.",
         counted(all.len(), "pair") + " of unknowns",
         label(*largest, 4)

@@ -62,7 +62,7 @@ stage_inputs! {
 
 impl Stage for ConvertDatum<'_> {
     const NAME: &'static str = "convert_datum";
-    const METHOD: u32 = 5;
+    const METHOD: u32 = 6;
     const CHECKED: bool = true;
     type Output = Converted;
     stage_inputs!(fingerprint);

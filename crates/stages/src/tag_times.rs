@@ -204,7 +204,7 @@ stage_inputs! {
 
 impl Stage for TagTimes<'_> {
     const NAME: &'static str = "tag_times";
-    const METHOD: u32 = 12;
+    const METHOD: u32 = 13;
     const CHECKED: bool = true;
     type Output = ImageTimes;
     stage_inputs!(fingerprint);

@@ -258,20 +258,21 @@ fn hardly_a_number_of_a_table_is_without_its_place() {
 }
 
 /// Paragraphs and lists with numbers that no document tells, by their first words, with what holds them instead.
-const TEXTS: [(&str, &str); 20] = [
+const TEXTS: [(&str, &str); 21] = [
     ("Relief alone would determine", "tests/report_geometric"),
     ("Surface kriged", "300 m is part of what roughness means"),
     ("At the tie points, the surface", "names of profiles"),
     ("E02-00665 and E02-01453", "the table below has the same"),
     ("Variance component", "levels of tests"),
     ("Shown: redundancy number", "levels of tests"),
-    ("No two unknowns", "the limit of what is listed"),
+    ("No correlation of two", "the limit of the listed correlations"),
     ("Light time", "spans over images; tests/light_time"),
     ("Limits for order 2", "the configuration"),
     ("Kept: class", "the configuration"),
     ("Datum from the version", "a constant"),
     ("Tolerance", "the method"),
     ("D = √", "a formula"),
+    ("The best time-tag correction", "the method"),
     ("1 PEDR file", "a note of the manifest"),
     ("−6.69 m largest mean", "the number of a profile"),
     ("ap18933l.b:", "a note of the manifest"),

@@ -170,7 +170,7 @@ fn the_position_by_the_relief_under_many_profiles_holds() {
     let (invalid, others) = (invalid(true), invalid(false));
     let _infallible = writeln!(
         page,
-        "\nOf {with_misplaced} sites in which a profile of an image is misplaced, {invalid} were invalid; of the other {} sites, \
+        "\nOf {with_misplaced} sites in which a profile simultaneous with an image is misplaced, {invalid} were invalid; of the other {} sites, \
          {others} were.\nOf {misplaced} further passes misplaced by 0.5 to 2 km, {found} were identified at crossovers; of {placed} others, \
          {refused} were rejected.",
         sites - with_misplaced

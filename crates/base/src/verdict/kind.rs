@@ -157,7 +157,7 @@ impl CheckKind {
             Self::AdjustmentMade => "Adjustment converged",
             Self::HeightAfter => "Tie points above {altimeter}, adjusted (median)",
             Self::HeightBefore => "Tie points above {altimeter}, before (median)",
-            Self::HeightOutliers => "Tie points beyond 3.29 σ of {altimeter}",
+            Self::HeightOutliers => "Tie points more than 3.29 σ from {altimeter}",
             Self::ProfilesApart => "Disagreement of {altimeter} profiles",
             Self::WithheldStretches => "Withheld profiles outside the stated 99.7 % interval",
             Self::SurfaceFilled => "Terrain model, completeness",

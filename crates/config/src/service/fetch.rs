@@ -9,7 +9,7 @@ use crate::{
 };
 
 declare_table! {
-    /// Retrieval of archive files, as by `areograph fetch`: copies of the indexes, and missing files that sites name.
+    /// Retrieval of archive files, as by `areograph fetch`: copies of the indexes, and files that sites lack.
     /// Files with different content are never replaced. Failures cause alerts, and the night continues.
     pub struct FetchConfig {
         /// Whether every night begins with the retrieval of archive files.

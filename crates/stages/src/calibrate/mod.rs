@@ -82,7 +82,7 @@ impl Input for CalibrationFiles<'_> {
 
 impl Stage for Calibrate<'_> {
     const NAME: &'static str = "calibrate";
-    const METHOD: u32 = 14;
+    const METHOD: u32 = 15;
     type Output = Calibration;
     stage_inputs!(fingerprint);
 
