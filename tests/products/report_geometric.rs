@@ -395,7 +395,9 @@ fn what_cannot_be_trusted_is_said() {
     let correlated = &site.adjusted.summary.correlated;
     let most = correlated.iter().map(|of| of.2.abs()).fold(0.0, f64::max);
     if correlated.is_empty() {
-        assert!(words.contains("No correlation of two unknowns of the adjustment exceeds 0.95 in magnitude."));
+        assert!(words.contains(
+            "No correlation of two unknowns of the adjustment exceeds 0.95 in magnitude."
+        ));
     } else {
         let rows = table(&page, "Largest correlations");
         assert_eq!(rows.len(), correlated.len().min(12));

@@ -220,7 +220,9 @@ pub(super) fn correlations(summary: &AdjustmentSummary) -> Markup {
     let mut all: Vec<_> = summary.correlated.iter().enumerate().collect();
     all.sort_by(|(_, a), (_, b)| b.2.abs().total_cmp(&a.2.abs()));
     let Some((_, (first, second, largest))) = all.first() else {
-        return paragraph("No correlation of two unknowns of the adjustment exceeds 0.95 in magnitude.");
+        return paragraph(
+            "No correlation of two unknowns of the adjustment exceeds 0.95 in magnitude.",
+        );
     };
     let sum = if *largest < 0.0 { "sum" } else { "difference" };
     let words = format!(

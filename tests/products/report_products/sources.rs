@@ -265,7 +265,10 @@ const TEXTS: [(&str, &str); 21] = [
     ("E02-00665 and E02-01453", "the table below has the same"),
     ("Variance component", "levels of tests"),
     ("Shown: redundancy number", "levels of tests"),
-    ("No correlation of two", "the limit of the listed correlations"),
+    (
+        "No correlation of two",
+        "the limit of the listed correlations",
+    ),
     ("Light time", "spans over images; tests/light_time"),
     ("Limits for order 2", "the configuration"),
     ("Kept: class", "the configuration"),
