@@ -66,6 +66,7 @@ fn surface() -> Surface {
             aside_m: 0.1,
             common_sigma_m: Some(1.5),
             shots_take_part: true,
+            reference: None,
             shots: ShotComparison::default(),
             look: SurfaceLook {
                 heights: heights.clone(),
@@ -184,7 +185,11 @@ fn files_and_page_state_what_was_computed() {
 fn rasters_are_layers_of_the_project(project: &Path, id: &str) {
     let sources = layers_refer_to_products(project);
     let orthoimage = format!("../images/{id}/orthoimage.tif");
-    let rasters = [&*orthoimage, "../surface.tif", "../surface.tif"];
+    let rasters = [
+        &*orthoimage,
+        "../surface_above_sphere.tif",
+        "../surface_above_sphere.tif",
+    ];
     assert_eq!(sources[sources.len() - 3..], rasters);
     let Some(found) = in_qgis(project, "orthoimages in QGIS") else {
         return;

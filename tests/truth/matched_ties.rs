@@ -62,7 +62,7 @@ impl Points {
             let above = HeightsAbove::default();
             read_terrain_model(&folder.join(name), Body::Mars, above).unwrap()
         };
-        let (model, sigmas) = (read("surface.tif"), read("surface_sigma.tif"));
+        let (model, sigmas) = (read("surface_above_sphere.tif"), read("surface_sigma.tif"));
         let columns = model.size[1];
         let cells = model.heights_m.iter().zip(&sigmas.heights_m).enumerate();
         let known = cells.filter(|(_, (height_m, _))| !height_m.is_nan());

@@ -10,7 +10,7 @@ use super::{
 
 declare_table! {
     /// A terrain model that areograph computes from a pair of images with `pixels`, with the adjusted orientation if
-    /// there is one: `surface.tif`, its standard deviations, and its comparison with the altimeter. Without `cell_m`,
+    /// there is one: `surface_above_sphere.tif`, its standard deviations, and its comparison with the altimeter. Without `cell_m`,
     /// no terrain model is computed.
     pub struct SurfaceConfig: Deserialize {
         /// Edge of a cell of the terrain model, usually three pixels of the coarser image; each height refers to a

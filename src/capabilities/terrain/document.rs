@@ -5,6 +5,7 @@ use std::{borrow::Cow, collections::BTreeMap};
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::contour_interval::contour_interval_m;
 use crate::{
     geom::statistics::Summary,
     products::Context,
@@ -60,7 +61,7 @@ const DEFINITIONS: [(&str, &str); 7] = [
 #[derive(Serialize, JsonSchema)]
 #[schemars(
     title = "Terrain model of a site",
-    description = "surface.json of areograph: derivation of surface.tif from a pair of images, statistics of its cells, and \
+    description = "surface.json of areograph: derivation of surface_above_sphere.tif from a pair of images, statistics of its cells, and \
          differences between altimeter and model. Metres and degrees; unknown values are omitted."
 )]
 pub(super) struct Document<'a> {
@@ -71,7 +72,7 @@ pub(super) struct Document<'a> {
     definitions: Vec<Definition>,
     /// Identifiers of both images.
     images: [&'a str; 2],
-    /// Whether too few cells matched to be significant: then there is no surface.tif.
+    /// Whether too few cells matched to be significant: then there is no surface_above_sphere.tif.
     refused: bool,
     matching: Matching,
     cells: Cells,
@@ -117,8 +118,19 @@ struct Cells {
 
 #[derive(Serialize, JsonSchema)]
 struct Heights {
-    /// Radius of the sphere to which the heights refer.
+    /// Radius of the sphere to which the heights of surface_above_sphere.tif refer.
     sphere_m: f64,
+    /// Surface to which the heights of the report and of surface_above_areoid.tif or surface_above_ellipsoid.tif refer;
+    /// omitted without shots.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reference: Option<&'static str>,
+    /// Largest distance of this surface from its radius as shots state it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reference_departure_m: Option<f64>,
+    /// Largest standard deviation of this surface at the corners of the model: shots of a single profile do not determine its
+    /// gradient across the profile.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reference_sigma_m: Option<f64>,
     #[schemars(range(min = 0.0))]
     sigma_m: f64,
     #[schemars(range(min = 0.0))]
@@ -127,6 +139,9 @@ struct Heights {
     smoothing_m: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     common_sigma_m: Option<f64>,
+    /// Interval of the contours, metres: 1, 2 or 5 times a power of ten, at least 3.29 times sigma_m and 1/25 of the relief.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    contour_interval_m: f64,
 }
 
 #[derive(Serialize, JsonSchema)]
@@ -148,6 +163,7 @@ impl<'a> Document<'a> {
         let account = &surface.account;
         let [rows, columns] = surface.model.heights.size;
         let terms = of.site.config.terms();
+        let reference = account.reference.as_ref();
         let definitions = DEFINITIONS.iter().map(|(of, is)| Definition {
             of,
             is: terms.fill(is),
@@ -177,10 +193,14 @@ impl<'a> Document<'a> {
             },
             heights: Heights {
                 sphere_m: surface.model.heights.radius_m,
+                reference: reference.map(|_| terms.areoid()),
+                reference_departure_m: reference.map(|of| of.departure_m),
+                reference_sigma_m: reference.map(|of| of.sigma_m),
                 sigma_m: account.sigma_m,
                 jitter_m: account.jitter_m,
                 smoothing_m: account.smoothing_m,
                 common_sigma_m: account.common_sigma_m,
+                contour_interval_m: contour_interval_m(account),
             },
             mola_minus_surface: Shots {
                 mola_takes_part: account.shots_take_part,

@@ -1,17 +1,28 @@
 //! The terrain model of a pair of images (`stages/map_surface`): files, section of the page, findings, counts.
 
+mod contour_interval;
 mod document;
 mod findings;
 mod products;
+mod relief;
 mod section;
 
 use super::Capability;
 use crate::{error::Result, stage::Round, stages::map_surface::Surface, store::book::Book};
 
-pub(super) use products::write_map;
+pub(super) use products::{Band, write_map, write_raster};
 
 pub(super) static CAPABILITY: Capability = Capability {
-    products: &[&products::HEIGHTS, &products::SIGMAS, &products::DOCUMENT],
+    products: &[
+        &products::ABOVE_SPHERE,
+        &products::ABOVE_AREOID,
+        &products::ABOVE_ELLIPSOID,
+        &products::SIGMAS,
+        &relief::HILLSHADE,
+        &relief::SLOPES,
+        &relief::CONTOURS,
+        &products::DOCUMENT,
+    ],
     section: section::SECTION,
     judge: Some(findings::findings),
     count: Some(counts),

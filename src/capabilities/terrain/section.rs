@@ -2,6 +2,11 @@
 
 use maud::{Markup, html};
 
+use super::{
+    contour_interval::contour_interval_m,
+    products::{ABOVE_SPHERE, SIGMAS, reference_file},
+    relief::{CONTOURS, HILLSHADE, SLOPES},
+};
 use crate::{
     error::Result,
     geom::statistics::Summary,
@@ -43,10 +48,16 @@ fn write(site: &SiteProducts, account: &SurfaceAccount) -> Result<Markup> {
         return Ok(html! { p { (words) } (table) });
     }
     let pictures = terrain_pictures(account, &site.config.terms())?;
+    let file = |name: &str| link(&format!("../{name}"), name);
     Ok(html! {
         p {
-            "Heights above the sphere of the body's maps: " (link("../surface.tif", "surface.tif"))
-            "; their standard deviations: " (link("../surface_sigma.tif", "surface_sigma.tif")) "."
+            @if let Some((surface, of)) = reference_file(site) {
+                "Heights above the " (surface) ", as in the figures: " (file(of.path)) ". "
+            }
+            "Heights above the sphere of the body's maps, for programs that expect this reference: "
+            (file(ABOVE_SPHERE.path)) ". Standard deviations: " (file(SIGMAS.path))
+            ". Shading: " (file(HILLSHADE.path)) ". Slopes: " (file(SLOPES.path))
+            ". Contours every " (label(contour_interval_m(account), 2)) " m: " (file(CONTOURS.path)) "."
         }
         (table)
         (compared(account, site.config.terms().altimeter))

@@ -44,11 +44,13 @@ use super::{
 use areograph_base::{
     body::Body,
     error::{Cause, Result},
+    footprints::Footprints,
+    frames::BodyFixed,
     ties::Unmatched,
     watch::Watch,
 };
 use areograph_config::MolaSurfaceConfig;
-use areograph_geom::pushbroom::Unseen;
+use areograph_geom::{pushbroom::Unseen, reference_surface::ReferenceSurface};
 use areograph_store::{
     stage::{Input, Inputs, Output, Stage},
     stage_inputs,
@@ -133,7 +135,7 @@ type Cell = Option<std::result::Result<Found, Unmatched>>;
 
 impl Stage for MapSurface<'_> {
     const NAME: &'static str = "map_surface";
-    const METHOD: u32 = 5;
+    const METHOD: u32 = 6;
     type Output = Surface;
     stage_inputs!(fingerprint);
 
@@ -174,6 +176,7 @@ impl Stage for MapSurface<'_> {
         let of_heights = adjusted.and_then(|adjusted| adjusted.heights.as_ref());
         account.common_sigma_m = of_heights.map(|of| of.mean_sigma_m[2]);
         account.shots_take_part = of_heights.is_some();
+        account.reference = reference(&surface.model, footprints);
         let shots = self.laser_surface.options(footprints.body);
         account.shots = compare(&surface.model, footprints, profiles, &shots);
         Ok(surface)
@@ -199,6 +202,20 @@ impl MapSurface<'_> {
         }
         Err(SurfaceError::NotTwo { found: pair.len() }.into())
     }
+}
+
+/// The areoid over a model, by the shots.
+fn reference(model: &SurfaceModel, footprints: &Footprints<BodyFixed>) -> Option<ReferenceSurface> {
+    let shots = (0..footprints.len()).map(|at| {
+        let place_rad = [
+            footprints.longitude_rad.at(at),
+            footprints.latitude_rad.at(at),
+        ];
+        (place_rad, footprints.areoid_radius_m.at(at))
+    });
+    let [west, south, east, north] = model.heights.edges_rad();
+    let corners_rad = [[west, south], [east, south], [west, north], [east, north]];
+    ReferenceSurface::fitted(footprints.body, &corners_rad, shots)
 }
 
 /// Options of a terrain model.
@@ -267,6 +284,7 @@ fn surface_of(common: &Common, cells: &[Cell]) -> Surface {
         aside_m: median(|cell| cell.aside) * sample_m,
         common_sigma_m: None,
         shots_take_part: false,
+        reference: None,
         shots: ShotComparison::default(),
         look: SurfaceModel::nothing().look(1),
     };

@@ -6,7 +6,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use areograph_base::ties::Unmatched;
-use areograph_geom::{height_grid::HeightGrid, statistics::Summary};
+use areograph_geom::{
+    height_grid::HeightGrid, reference_surface::ReferenceSurface, statistics::Summary,
+};
 
 /// A terrain model with its statistics.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -66,6 +68,8 @@ pub struct SurfaceAccount {
     pub common_sigma_m: Option<f64>,
     /// Whether the shots controlled heights of the adjustment and are therefore not independent.
     pub shots_take_part: bool,
+    /// The areoid over it, or the ellipsoid where shots have no areoid; `None` without a shot.
+    pub reference: Option<ReferenceSurface>,
     /// The altimeter's shots on it.
     pub shots: ShotComparison,
     /// The model in larger cells, for display.
@@ -205,6 +209,16 @@ impl SurfaceModel {
 }
 
 impl SurfaceAccount {
+    /// A grid of the model with its heights above the areoid, or the ellipsoid; above the sphere where neither is known.
+    #[must_use]
+    pub fn above_reference(&self, grid: &HeightGrid) -> HeightGrid {
+        let heights_m = self.reference.as_ref().map(|of| of.heights_m(grid));
+        HeightGrid {
+            heights_m: heights_m.unwrap_or_else(|| grid.heights_m.clone()),
+            ..grid.clone()
+        }
+    }
+
     /// Cells with texture that were searched in both images.
     #[must_use]
     pub fn searched(&self) -> u32 {
