@@ -50,6 +50,7 @@ fn surface() -> Surface {
     Surface {
         account: SurfaceAccount {
             images: [0, 0],
+            directions: [[0.0; 3]; 2],
             cell_m: 10.0,
             sample_m: 5.0,
             compared_m: 50.0,
@@ -67,6 +68,7 @@ fn surface() -> Surface {
             common_sigma_m: Some(1.5),
             shots_take_part: true,
             reference: None,
+            joint: None,
             shots: ShotComparison::default(),
             look: SurfaceLook {
                 heights: heights.clone(),
@@ -77,6 +79,7 @@ fn surface() -> Surface {
             heights,
             parallel_rad: 0.0,
             sigmas_m,
+            pairs: Vec::new(),
         },
     }
 }

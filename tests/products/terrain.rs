@@ -17,7 +17,9 @@ use areograph::{
     pds::terrain_model::{HeightsAbove, read_terrain_model},
     products::{SiteProducts, listed},
     stage::{Output, Provenance, Round},
-    stages::map_surface::{ShotComparison, Surface, SurfaceAccount, SurfaceModel},
+    stages::map_surface::{
+        JoinedPair, Joint, Seam, ShotComparison, Surface, SurfaceAccount, SurfaceModel,
+    },
 };
 use serde_json::Value;
 use tiff::decoder::{Decoder, DecodingResult};
@@ -64,6 +66,7 @@ fn model() -> SurfaceModel {
             heights_m,
         },
         parallel_rad: PARALLEL_RAD,
+        pairs: Vec::new(),
     }
 }
 
@@ -80,6 +83,7 @@ fn surface(site: &SiteProducts) -> Surface {
     Surface {
         account: SurfaceAccount {
             images: [0, 0],
+            directions: [[0.0; 3]; 2],
             cell_m: CELL_M,
             sample_m: 20.0,
             compared_m: 340.0,
@@ -97,6 +101,7 @@ fn surface(site: &SiteProducts) -> Surface {
             common_sigma_m: Some(1.5),
             shots_take_part: true,
             reference,
+            joint: None,
             shots: ShotComparison::default(),
             look: model.look(480),
         },
@@ -106,6 +111,15 @@ fn surface(site: &SiteProducts) -> Surface {
 
 /// Writes the products of the site; returns its page.
 fn written(folder: &Path) -> String {
+    written_with(folder, false, surface)
+}
+
+/// As [`written`], for another model, and with filled holes.
+fn written_with(
+    folder: &Path,
+    filled: bool,
+    surface: impl FnOnce(&SiteProducts) -> Surface,
+) -> String {
     Site::small().with(true, |site| {
         let nowhere = Provenance {
             blake3: String::new(),
@@ -115,8 +129,11 @@ fn written(folder: &Path) -> String {
         let mut book = site.book.clone();
         book.enter_heavy(Round::Initial, surface, Surface::without_model)
             .unwrap();
+        let mut config = site.config.clone();
+        config.surface.filled = filled;
         let site = SiteProducts {
             book: &book,
+            config: &config,
             ..*site
         };
         let listed = listed(&site, capabilities::declarations());
@@ -155,7 +172,14 @@ fn heights_name_their_reference_surface() {
     let page = written(folder.path());
     let path = |name: &str| folder.path().join(name);
     let [above_sphere, above_areoid] = ["surface_above_sphere.tif", "surface_above_areoid.tif"];
-    assert!(!path("surface_above_ellipsoid.tif").exists());
+    for name in [
+        "surface_above_ellipsoid.tif",
+        "surface_pairs.tif",
+        "surface_filled_above_sphere.tif",
+        "surface_filled_above_areoid.tif",
+    ] {
+        assert!(!path(name).exists(), "{name}");
+    }
     let expected_m = model().heights.heights_m;
     let written_m = numbers(&path(above_areoid));
     for (at, (of_sphere, of_areoid)) in numbers(&path(above_sphere))
@@ -288,4 +312,99 @@ fn contours_have_their_heights_and_cross_no_hole() {
         }
     }
     assert!(places > 1_000 && index > 0);
+}
+
+/// The model as that of two pairs, and of a third without a model.
+fn joined_surface(site: &SiteProducts) -> Surface {
+    let mut surface = surface(site);
+    let pair = |bit: Option<u32>, offset_m: f64| JoinedPair {
+        images: [0, 0],
+        bit,
+        cells: 1_600,
+        filled: 1_500,
+        convergence_rad: 0.3,
+        sigma_m: 4.5,
+        offset_m,
+        offset_sigma_m: 0.25,
+        shots_above_m: bit.map(|_| [1.25, 0.5]),
+    };
+    surface.account.joint = Some(Joint {
+        pairs: vec![pair(Some(0), 6.125), pair(Some(1), -6.375), pair(None, 0.0)],
+        seams: vec![Seam {
+            pairs: [0, 1],
+            cells: 500,
+            before_m: 12.75,
+            after_m: 0.25,
+            sigma_m: 0.5,
+            spread_sigmas: 1.25,
+        }],
+        filled: 2_500,
+        several: 500,
+    });
+    surface.model.pairs = (0..SIZE[0] * SIZE[1]).map(bits).collect();
+    surface
+}
+
+/// Pairs of a cell: the first in the west, the second in the east.
+fn bits(at: usize) -> u32 {
+    let [row, column] = [at / SIZE[1], at % SIZE[1]];
+    if is_hole([row, column]) {
+        return 0;
+    }
+    u32::from(column < 25) | (u32::from(column >= 15) << 1)
+}
+
+#[test]
+fn pairs_are_identified_and_holes_are_filled_where_requested() {
+    let folder = tempfile::tempdir().unwrap();
+    let page = written_with(folder.path(), true, joined_surface);
+    let path = |name: &str| folder.path().join(name);
+    let mut decoder = Decoder::new(File::open(path("surface_pairs.tif")).unwrap()).unwrap();
+    let DecodingResult::U32(found) = decoder.read_image().unwrap() else {
+        panic!("other numbers");
+    };
+    assert_eq!(found, (0..SIZE[0] * SIZE[1]).map(bits).collect::<Vec<_>>());
+    if let Some(mut gdalinfo) = program("gdalinfo", "pairs in GDAL") {
+        let text = output(gdalinfo.arg("-json").arg(path("surface_pairs.tif")));
+        let found: Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(found["bands"][0]["type"], "UInt32");
+        assert_eq!(found["bands"][0]["noDataValue"], 0.0);
+    }
+
+    let document = json(&path("surface.json"));
+    assert_eq!(document["joint"]["pairs"][0]["bit"], 0);
+    assert_eq!(document["joint"]["pairs"][2]["bit"], Value::Null);
+    assert_eq!(document["joint"]["seams"][0]["before_m"], 12.75);
+    let section = page.split("id=\"terrain-model\"").nth(1).unwrap();
+    let seams = section.rsplit("Seams: heights").next().unwrap();
+    let seams = seams.split("</table>").next().unwrap();
+    for number in ["500", "+12.75", "+0.25", "0.50", "1.25"] {
+        assert!(seams.contains(&format!(">{number}<")), "{number}: {seams}");
+    }
+    assert!(section.contains("no model"));
+
+    let known = model().heights.heights_m;
+    let filled = numbers(&path("surface_filled_above_sphere.tif"));
+    let of_areoid = numbers(&path("surface_filled_above_areoid.tif"));
+    let sigmas = numbers(&path("surface_filled_sigma.tif"));
+    for at in 0..known.len() {
+        let [row, column] = [at / SIZE[1], at % SIZE[1]];
+        // The hole inside is nine cells wide; the corner of the model is no hole.
+        assert_eq!(filled[at].is_nan(), row + column < 12, "{row} {column}");
+        assert_eq!(
+            [of_areoid[at], sigmas[at]].map(f32::is_nan),
+            [filled[at].is_nan(); 2]
+        );
+        if filled[at].is_nan() {
+            continue;
+        }
+        if known[at].is_nan() {
+            // Hills of 20 degrees change by more than 4 m over a cell of 100 m.
+            assert!(sigmas[at] > 8.0, "{}", sigmas[at]);
+        } else {
+            assert!((filled[at] - known[at]).abs() < 1e-6 && (sigmas[at] - 4.0).abs() < 1e-6);
+        }
+    }
+    // The model itself keeps its hole.
+    assert!(numbers(&path("surface_above_areoid.tif"))[25 * SIZE[1] + 20].is_nan());
 }

@@ -203,6 +203,11 @@ fn place(grid: &HeightGrid, (at, is_down): Side, height_m: f64) -> [f64; 2] {
 }
 
 #[cfg(test)]
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "cells and heights of small grids"
+)]
 mod tests {
     use super::*;
 

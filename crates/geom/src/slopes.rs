@@ -84,6 +84,11 @@ fn gradients(grid: &HeightGrid) -> impl Iterator<Item = Option<[f64; 2]>> {
 }
 
 #[cfg(test)]
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "cells and heights of small grids"
+)]
 mod tests {
     use super::*;
 

@@ -1,8 +1,10 @@
-//! The terrain model of a pair of images (`stages/map_surface`): files, section of the page, findings, counts.
+//! The terrain model of a site (`stages/map_surface`, `stages/join_surfaces`): files, section of the page, findings, counts.
 
 mod contour_interval;
 mod document;
 mod findings;
+mod joint;
+mod joint_document;
 mod products;
 mod relief;
 mod section;
@@ -18,6 +20,10 @@ pub(super) static CAPABILITY: Capability = Capability {
         &products::ABOVE_AREOID,
         &products::ABOVE_ELLIPSOID,
         &products::SIGMAS,
+        &joint::PAIRS,
+        &joint::FILLED_ABOVE_SPHERE,
+        &joint::FILLED_ABOVE_AREOID,
+        &joint::FILLED_SIGMAS,
         &relief::HILLSHADE,
         &relief::SLOPES,
         &relief::CONTOURS,

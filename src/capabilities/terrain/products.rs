@@ -117,7 +117,7 @@ pub(super) static DOCUMENT: Declaration = Declaration {
 pub(super) const WITH_A_MODEL: &str = "a site with a terrain model";
 
 /// The terrain model of a site, where enough cells matched.
-fn significant<'a>(site: &SiteProducts<'a>) -> Result<Option<&'a SurfaceModel>> {
+pub(super) fn significant<'a>(site: &SiteProducts<'a>) -> Result<Option<&'a SurfaceModel>> {
     let surface = site.find::<Surface>()?;
     let significant = surface.filter(|surface| !surface.account.is_refused);
     Ok(significant.map(|surface| &surface.model))
@@ -172,9 +172,14 @@ fn write_cells(
 
 /// Writes the heights of all cells above `surface`.
 fn write_above(path: &Path, of: &Context, surface: &str) -> Result<u64> {
+    let model = significant(of.site)?;
+    model.map_or(Ok(0), |model| above(path, of, surface, model))
+}
+
+/// Writes the heights of all cells of a model of the site above `surface`.
+pub(super) fn above(path: &Path, of: &Context, surface: &str, model: &SurfaceModel) -> Result<u64> {
     let known = of.site.find::<Surface>()?;
-    let known = known.and_then(|known| Some((&known.model, known.account.reference.as_ref()?)));
-    let Some((model, reference)) = known else {
+    let Some(reference) = known.and_then(|known| known.account.reference.as_ref()) else {
         return Ok(0);
     };
     let numbers = reference.heights_m(&model.heights);

@@ -4,6 +4,7 @@ use maud::{Markup, html};
 
 use super::{
     contour_interval::contour_interval_m,
+    joint::tables,
     products::{ABOVE_SPHERE, SIGMAS, reference_file},
     relief::{CONTOURS, HILLSHADE, SLOPES},
 };
@@ -60,6 +61,7 @@ fn write(site: &SiteProducts, account: &SurfaceAccount) -> Result<Markup> {
             ". Contours every " (label(contour_interval_m(account), 2)) " m: " (file(CONTOURS.path)) "."
         }
         (table)
+        @if let Some(joint) = &account.joint { (tables(site, joint, site.config.terms().altimeter)) }
         (compared(account, site.config.terms().altimeter))
         div.plots { (pictures) }
     })
@@ -68,7 +70,7 @@ fn write(site: &SiteProducts, account: &SurfaceAccount) -> Result<Markup> {
 /// Making of the model, and outcomes of its cells.
 fn made(site: &SiteProducts, account: &SurfaceAccount) -> Markup {
     let mut table = Table::new(
-        "Terrain model from a pair of images",
+        "Terrain model from pairs of images",
         &[
             Column::Text("images"),
             Column::Number("cell (m)"),
@@ -84,6 +86,15 @@ fn made(site: &SiteProducts, account: &SurfaceAccount) -> Markup {
         ],
     );
     let [first, second] = account.images.map(|image| &site.images[image].times.id);
+    let images = account.joint.as_ref().map_or_else(
+        || format!("{first}, {second}"),
+        |joint| {
+            format!(
+                "{} pairs",
+                joint.pairs.iter().filter(|of| of.bit.is_some()).count()
+            )
+        },
+    );
     let common = account.common_sigma_m.map_or_else(
         || Cell::from("not known"),
         |sigma_m| Cell::from(label(sigma_m, 1)).traced("/heights/common_sigma_m"),
@@ -94,7 +105,7 @@ fn made(site: &SiteProducts, account: &SurfaceAccount) -> Markup {
         "surface.json#",
         !account.is_refused,
         [
-            format!("{first}, {second}").into(),
+            images.into(),
             of(account.cell_m, 1, "/cells/cell_m"),
             of(account.compared_m, 0, "/matching/compared_m"),
             Cell::from(whole(account.cells)).traced("/cells/common"),

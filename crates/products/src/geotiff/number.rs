@@ -77,3 +77,24 @@ fn differences(bytes: impl Iterator<Item = u8>) -> Vec<u8> {
     let difference = bytes.map(|byte| byte.wrapping_sub(std::mem::replace(&mut before, byte)));
     difference.collect()
 }
+
+/// Bits of a set; 0 for an empty one. A larger cell has the bits of all its cells.
+impl Number for u32 {
+    const LAYOUT: [usize; 2] = [32, 1];
+    const NO_DATA: &'static str = "0";
+    const NONE: Self = 0;
+
+    fn is_none(self) -> bool {
+        self == 0
+    }
+
+    fn mean(numbers: impl Iterator<Item = Self> + Clone) -> Self {
+        numbers.fold(0, std::ops::BitOr::bitor)
+    }
+
+    const PREDICTOR: usize = 1;
+
+    fn predicted(row: &[Self]) -> Vec<u8> {
+        row.iter().flat_map(|of| of.to_le_bytes()).collect()
+    }
+}

@@ -40,7 +40,7 @@ stage_inputs! {
 
 impl Stage for MapLines<'_> {
     const NAME: &'static str = "map_surface";
-    const METHOD: u32 = 2;
+    const METHOD: u32 = 1;
     const CALLS: &'static [Called] = &[called::<MapSurface<'_>>()];
     type Output = Surface;
     stage_inputs!(fingerprint);

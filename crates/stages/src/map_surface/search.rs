@@ -42,7 +42,9 @@ pub(super) fn search(
     let mut images = [Vec::new(), Vec::new()];
     for step in 0..=2 * reach {
         pair.lay((step as f64 - reach as f64) * step_m, &mut images);
-        images.iter_mut().for_each(|numbers| centre(numbers));
+        for numbers in &mut images {
+            centre(numbers);
+        }
         let mut alike = alike.iter_mut();
         let compare = |sums| {
             if let Some(alike) = alike.next() {
