@@ -1,6 +1,7 @@
 //! Files of the terrain model of a small site, as other programs read them.
 
 #![allow(
+    clippy::panic,
     clippy::unwrap_used,
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,

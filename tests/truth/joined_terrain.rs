@@ -1,5 +1,6 @@
 //! The terrain model of three images, all pairs of which are joined, against the true ground.
 #![allow(
+    clippy::panic,
     clippy::unwrap_used,
     clippy::disallowed_methods,
     reason = "helpers of tests may fail loudly, and write site files"
