@@ -102,10 +102,13 @@ mod tests {
     #[test]
     fn stages_are_listed_in_the_order_in_which_the_flow_passes_them() {
         let mut config = SiteConfig::default();
-        config.images.push(ImageConfig {
-            pixels: Some(PathBuf::new()),
-            ..ImageConfig::default()
-        });
+        // Three images have several pairs.
+        for _ in 0..3 {
+            config.images.push(ImageConfig {
+                pixels: Some(PathBuf::new()),
+                ..ImageConfig::default()
+            });
+        }
         config.windows.push(WindowConfig {
             id: String::new(),
             shape: WindowShape::Image {

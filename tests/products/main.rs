@@ -19,3 +19,4 @@ mod report_many;
 mod report_page;
 mod report_products;
 mod spacing;
+mod terrain;

@@ -50,6 +50,7 @@ fn surface() -> Surface {
     Surface {
         account: SurfaceAccount {
             images: [0, 0],
+            directions: [[0.0; 3]; 2],
             cell_m: 10.0,
             sample_m: 5.0,
             compared_m: 50.0,
@@ -66,6 +67,8 @@ fn surface() -> Surface {
             aside_m: 0.1,
             common_sigma_m: Some(1.5),
             shots_take_part: true,
+            reference: None,
+            joint: None,
             shots: ShotComparison::default(),
             look: SurfaceLook {
                 heights: heights.clone(),
@@ -76,6 +79,7 @@ fn surface() -> Surface {
             heights,
             parallel_rad: 0.0,
             sigmas_m,
+            pairs: Vec::new(),
         },
     }
 }
@@ -184,7 +188,11 @@ fn files_and_page_state_what_was_computed() {
 fn rasters_are_layers_of_the_project(project: &Path, id: &str) {
     let sources = layers_refer_to_products(project);
     let orthoimage = format!("../images/{id}/orthoimage.tif");
-    let rasters = [&*orthoimage, "../surface.tif", "../surface.tif"];
+    let rasters = [
+        &*orthoimage,
+        "../surface_above_sphere.tif",
+        "../surface_above_sphere.tif",
+    ];
     assert_eq!(sources[sources.len() - 3..], rasters);
     let Some(found) = in_qgis(project, "orthoimages in QGIS") else {
         return;

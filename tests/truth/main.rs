@@ -3,6 +3,7 @@
 mod clean_missions;
 #[path = "../common/mod.rs"]
 mod common;
+mod joined_terrain;
 mod matched_ties;
 mod mutations;
 mod scene_errors;

@@ -32,9 +32,9 @@ const SITES: [&str; 3] = ["eos_chasma", "gusev_crater", "isidis"];
 const SEARCH: [(f64, i32); 3] = [(40.0, 10), (8.0, 6), (1.5, 6)];
 
 /// Places of a site by its images: positions, metres, and standard deviations of their heights against each other, metres.
-struct Points {
+pub(crate) struct Points {
     places_m: Vec<Vector3<f64>>,
-    sigmas_m: Vec<f64>,
+    pub(crate) sigmas_m: Vec<f64>,
 }
 
 impl Points {
@@ -57,12 +57,12 @@ impl Points {
     }
 
     /// Cells of the terrain model with a height, evenly chosen.
-    fn of_terrain_model(folder: &Path) -> Self {
+    pub(crate) fn of_terrain_model(folder: &Path) -> Self {
         let read = |name: &str| {
             let above = HeightsAbove::default();
             read_terrain_model(&folder.join(name), Body::Mars, above).unwrap()
         };
-        let (model, sigmas) = (read("surface.tif"), read("surface_sigma.tif"));
+        let (model, sigmas) = (read("surface_above_sphere.tif"), read("surface_sigma.tif"));
         let columns = model.size[1];
         let cells = model.heights_m.iter().zip(&sigmas.heights_m).enumerate();
         let known = cells.filter(|(_, (height_m, _))| !height_m.is_nan());
@@ -82,7 +82,7 @@ impl Points {
     }
 
     /// Height errors over their standard deviations, and their root mean square, metres.
-    fn ratios(&self, ground: &TrueGround) -> (Vec<f64>, f64) {
+    pub(crate) fn ratios(&self, ground: &TrueGround) -> (Vec<f64>, f64) {
         let errors_m = self.height_errors_m(ground);
         let square_m2: f64 = errors_m.iter().map(|error_m| error_m * error_m).sum();
         let rms_m = (square_m2 / errors_m.len() as f64).sqrt();

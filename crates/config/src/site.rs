@@ -199,7 +199,7 @@ fn matched_images(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     }
 }
 
-/// A terrain model requires two images with pixels, and their names where there are more.
+/// A terrain model requires at least two images with pixels.
 fn images_of_surface(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     if site.surface.cell_m.is_none() {
         return;
@@ -207,19 +207,11 @@ fn images_of_surface(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     let with_pixels = site.images.iter().filter(|image| image.pixels.is_some());
     let known: Vec<&str> = with_pixels.map(|image| &*image.id).collect();
     match &site.surface.images {
-        None if known.len() == 2 => {}
-        None if known.len() < 2 => {
+        None if known.len() >= 2 => {}
+        None => {
             let expected = "no cell_m, or at least two images with images.pixels";
             keys.refuse_below("surface", "cell_m", expected);
         }
-        None => keys.refuse_below(
-            "surface",
-            "cell_m",
-            format!(
-                "surface.images as well: two of {}, which have pixels",
-                known.join(", ")
-            ),
-        ),
         Some([one, other]) => {
             let is_known = |id: &String| known.contains(&&**id);
             if one == other || !is_known(one) || !is_known(other) {

@@ -5,12 +5,12 @@ use serde_json::json;
 
 use super::{
     declare::{Keys, declare_table, key},
-    forms::{above_to, identifier, several},
+    forms::{Switch, above_to, identifier, several},
 };
 
 declare_table! {
-    /// A terrain model that areograph computes from a pair of images with `pixels`, with the adjusted orientation if
-    /// there is one: `surface.tif`, its standard deviations, and its comparison with the altimeter. Without `cell_m`,
+    /// A terrain model that areograph computes from all pairs of images with `pixels`, with the adjusted orientation if
+    /// there is one: `surface_above_sphere.tif`, its standard deviations, and its comparison with the altimeter. Without `cell_m`,
     /// no terrain model is computed.
     pub struct SurfaceConfig: Deserialize {
         /// Edge of a cell of the terrain model, usually three pixels of the coarser image; each height refers to a
@@ -20,8 +20,11 @@ declare_table! {
         /// Edge of a cell of orthoimages on this terrain model, usually the ground size of an image pixel. Orthoimages
         /// are computed from every image with `pixels` and tie points; without this key, none is computed.
         orthoimage_cell_m: Option<f64> = key(above_to(0.0, 1e5)).unused("5.0"),
-        /// Identifiers of the two images, if more than two images of the site have `pixels`.
+        /// Identifiers of the two images if a single pair is used although more than two images of the site have `pixels`.
         images: Option<[String; 2]> = key(several(identifier(), "identifiers of two images")).unused(r#"["m0402852", "m0403104"]"#),
+        /// Whether to write another terrain model, `surface_filled_*.tif`, with interpolated heights in holes of up to 16
+        /// cells, with larger standard deviations.
+        filled: bool = key(Switch).or(false),
     }
     check a_cell_is_given
 }

@@ -11,7 +11,7 @@
 //! | match patches of pixels | [`imaging`] |
 //!
 //! It also has attitude, polynomials, Chebyshev pieces, interpolation, statistics, random numbers, heights on a grid,
-//! the ground between shots, and the uncertainty budget. `imaging` covers texture, correlation and least-squares
+//! the areoid over a site, the ground between shots, and the uncertainty budget. `imaging` covers texture, correlation and least-squares
 //! matching.
 //!
 //! ```
@@ -34,6 +34,7 @@ pub mod calibration;
 pub mod chebyshev;
 pub mod collinearity;
 pub mod conformal_map;
+pub mod contours;
 pub mod convex;
 pub mod ellipsoid;
 pub mod height_grid;
@@ -54,8 +55,10 @@ pub mod pushbroom;
 pub mod random;
 pub mod range_residuals;
 pub mod readings;
+pub mod reference_surface;
 pub mod robust;
 pub mod scattered_heights;
+pub mod slopes;
 pub mod statistics;
 pub mod surface;
 pub mod uncertainty;

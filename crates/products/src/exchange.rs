@@ -3,6 +3,7 @@
 pub(super) mod adjusted;
 mod binary_network;
 mod bundleout;
+mod contours;
 mod control_network;
 mod gcp;
 pub(super) mod geopackage;
@@ -17,6 +18,7 @@ pub(super) mod stac;
 pub(super) mod tables;
 
 pub use binary_network::write_binary_network;
+pub use contours::{ContourLayer, write_contours};
 pub use control_network::{ControlNetwork, NetworkMeasure, NetworkPoint, write_control_network};
 pub use gcp::{ControlMeasure, ControlPoint, write_gcp};
 pub use lidar_data::{LidarPoint, ProfileShift, write_lidar_data};

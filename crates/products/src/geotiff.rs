@@ -1,86 +1,29 @@
 //! Numbers on a grid as a cloud-optimised `GeoTIFF`: tables of all sizes first, then tiles from the smallest size to
-//! full size, so that a viewer needs only the beginning and the tiles that it shows. Without compression, for readers
-//! that require it.
+//! full size, so that a viewer needs only the beginning and the tiles that it shows. Tiles are compressed with deflate.
 //!
 //! The TIFF library writes tables after their data; here they precede them and are therefore written by this module.
 
+mod fields;
+mod number;
+
+use std::io::Write as _;
+
+use flate2::{Compression, write::ZlibEncoder};
+use rayon::prelude::*;
+
+use self::fields::{Field, long, table};
 use areograph_base::{
     body::{Body, MapSphere},
     units::RADIANS_PER_DEGREE,
 };
 use areograph_geom::height_grid::HeightGrid;
 
+pub use number::Number;
+
 /// Edge of a tile, cells.
 const TILE: usize = 256;
 /// Signals to GDAL that tables come first; 32 and its own bytes counted from its third line.
 const LAYOUT: &str = "LAYOUT=IFDS_BEFORE_DATA\nKNOWN_INCOMPATIBLE_EDITION=NO\n ";
-
-/// Types of values.
-const ASCII: u16 = 2;
-const SHORT: u16 = 3;
-const LONG: u16 = 4;
-const DOUBLE: u16 = 12;
-
-/// A kind of number in a file.
-pub trait Number: Copy {
-    /// Bits, and format of the sample: 1 without a sign, 3 with decimals.
-    const LAYOUT: [usize; 2];
-    /// Cells without a number, as readers of the file find them.
-    const NO_DATA: &'static str;
-    /// A cell without a number.
-    const NONE: Self;
-
-    /// Whether the cell has no number.
-    fn is_none(self) -> bool;
-
-    /// The mean of numbers, of which there is at least one.
-    fn mean(numbers: impl Iterator<Item = Self> + Clone) -> Self;
-
-    /// Appends its bytes in the file.
-    fn append(self, bytes: &mut Vec<u8>);
-}
-
-/// Numbers in metres; NaN without a number.
-impl Number for f32 {
-    const LAYOUT: [usize; 2] = [32, 3];
-    const NO_DATA: &'static str = "-32768";
-    const NONE: Self = Self::NAN;
-
-    fn is_none(self) -> bool {
-        self.is_nan()
-    }
-
-    fn mean(numbers: impl Iterator<Item = Self> + Clone) -> Self {
-        let count: Self = numbers.clone().map(|_| 1.0).sum();
-        numbers.sum::<Self>() / count
-    }
-
-    fn append(self, bytes: &mut Vec<u8>) {
-        let number = if self.is_nan() { -32_768.0 } else { self };
-        bytes.extend(number.to_le_bytes());
-    }
-}
-
-/// Brightness from 1 on; 0 without one.
-impl Number for u8 {
-    const LAYOUT: [usize; 2] = [8, 1];
-    const NO_DATA: &'static str = "0";
-    const NONE: Self = 0;
-
-    fn is_none(self) -> bool {
-        self == 0
-    }
-
-    fn mean(numbers: impl Iterator<Item = Self> + Clone) -> Self {
-        let count: u32 = numbers.clone().map(|_| 1).sum();
-        let sum: u32 = numbers.map(u32::from).sum();
-        Self::try_from((sum + count / 2) / count).unwrap_or(Self::MAX)
-    }
-
-    fn append(self, bytes: &mut Vec<u8>) {
-        bytes.push(self);
-    }
-}
 
 /// Contents of a file.
 pub struct GeoTiff<'a, N> {
@@ -90,18 +33,15 @@ pub struct GeoTiff<'a, N> {
     pub parallel_rad: f64,
     /// The body whose sphere the grid is of.
     pub body: Body,
-    /// Meaning of the numbers, in words.
+    /// Meaning of the numbers, in words, which readers show as the name of the band.
     pub what: &'a str,
+    /// Unit of the numbers, as in `m`; empty without one.
+    pub unit: &'a str,
+    /// The surface from which heights are counted where it is not the sphere of the map, as in `MOLA areoid`; empty for
+    /// other numbers.
+    pub vertical: &'a str,
     /// Row by row.
     pub numbers: &'a [N],
-}
-
-/// A field of a table.
-struct Field {
-    tag: u16,
-    kind: u16,
-    count: usize,
-    bytes: Vec<u8>,
 }
 
 /// One size of the numbers.
@@ -111,11 +51,12 @@ struct Size<N> {
     numbers: Vec<N>,
 }
 
-impl<N: Number> GeoTiff<'_, N> {
+impl<N: Number + Send + Sync> GeoTiff<'_, N> {
     /// The file.
     #[must_use]
     pub fn encoded(&self) -> Vec<u8> {
         let sizes = self.sizes();
+        let tiles: Vec<Vec<Vec<u8>>> = sizes.iter().map(Size::compressed).collect();
         let head = format!(
             "GDAL_STRUCTURAL_METADATA_SIZE={:06} bytes\n{LAYOUT}",
             LAYOUT.len()
@@ -126,18 +67,17 @@ impl<N: Number> GeoTiff<'_, N> {
         bytes.extend(head.as_bytes());
         bytes.resize(first, 0);
         // Offsets of tiles depend on the length of the tables, not the other way round.
-        let nowhere: Vec<usize> = vec![0; sizes.len()];
-        let tables = self.tables(&sizes, first, &nowhere);
-        let mut at = first + tables.len();
-        let mut begins = nowhere;
-        for (begin, size) in begins.iter_mut().zip(&sizes).rev() {
+        let mut places: Vec<Vec<[usize; 2]>> = tiles
+            .iter()
+            .map(|tiles| tiles.iter().map(|tile| [0, tile.len()]).collect())
+            .collect();
+        let mut at = first + self.tables(&sizes, first, &places).len();
+        for [begin, length] in places.iter_mut().rev().flatten() {
             *begin = at;
-            at += size.tiles() * tile_bytes::<N>();
+            at += *length;
         }
-        bytes.extend(self.tables(&sizes, first, &begins));
-        for size in sizes.iter().rev() {
-            size.append(&mut bytes);
-        }
+        bytes.extend(self.tables(&sizes, first, &places));
+        bytes.extend(tiles.iter().rev().flatten().flatten());
         bytes
     }
 
@@ -157,11 +97,11 @@ impl<N: Number> GeoTiff<'_, N> {
         sizes
     }
 
-    /// Tables of all sizes, which begin at the byte `at`.
-    fn tables(&self, sizes: &[Size<N>], at: usize, begins: &[usize]) -> Vec<u8> {
+    /// Tables of all sizes, which begin at the byte `at`; `places` are offsets and lengths of tiles.
+    fn tables(&self, sizes: &[Size<N>], at: usize, places: &[Vec<[usize; 2]>]) -> Vec<u8> {
         let mut bytes = Vec::new();
-        for (number, (size, begin)) in sizes.iter().zip(begins).enumerate() {
-            let mut fields = size.fields(*begin, number > 0);
+        for (number, (size, places)) in sizes.iter().zip(places).enumerate() {
+            let mut fields = size.fields(places, number > 0);
             if number == 0 {
                 fields.extend(self.fields());
             }
@@ -180,8 +120,10 @@ impl<N: Number> GeoTiff<'_, N> {
         let [west_rad, _, _, north_rad] = self.grid.edges_rad();
         let cell_m = self.grid.cell_rad[1] * radius_m;
         let place_m = [west_rad * self.parallel_rad.cos(), north_rad].map(|of| of * radius_m);
-        let names = format!("Equirectangular {}|{crs}|", self.body.names().name);
-        let split = names.find('|').map_or(0, |at| at + 1);
+        let of_map = format!("Equirectangular {}|", self.body.names().name);
+        let of_sphere = format!("{crs}|");
+        let of_heights = format!("height above the {}|", self.vertical);
+        let (split, end) = (of_map.len(), of_map.len() + of_sphere.len());
         // Map, areas, a name; sphere, its name, degrees, both half-axes, meridian; map, its kind, metres, parallel,
         // longitude.
         let user = 32_767;
@@ -190,7 +132,7 @@ impl<N: Number> GeoTiff<'_, N> {
             [1024, 0, 1, 1],
             [1025, 0, 1, 1],
             [2048, 0, 1, user],
-            [2049, 34_737, names.len() - split, split],
+            [2049, 34_737, of_sphere.len(), split],
             [2050, 0, 1, user],
             [2054, 0, 1, 9102],
             [2056, 0, 1, user],
@@ -208,9 +150,21 @@ impl<N: Number> GeoTiff<'_, N> {
             [3083, 34_736, 1, 2],
             [3088, 34_736, 1, 2],
         ];
-        let mut keys: Vec<[usize; 4]> = keys.into_iter().chain(rest).collect();
+        // A vertical system: its own, with a name and a datum, metres.
+        let vertical: [[usize; 4]; 4] = [
+            [4096, 0, 1, user],
+            [4097, 34_737, of_heights.len(), end],
+            [4098, 0, 1, user],
+            [4099, 0, 1, 9001],
+        ];
+        let has_vertical = !self.vertical.is_empty();
+        let vertical = vertical.into_iter().filter(|_| has_vertical);
+        let mut keys: Vec<[usize; 4]> = keys.into_iter().chain(rest).chain(vertical).collect();
+        // Vertical systems are part of GeoTIFF 1.1.
+        keys[0][2] = usize::from(has_vertical);
         keys[0][3] = keys.len() - 1;
         let numbers = [radius_m, self.parallel_rad / RADIANS_PER_DEGREE, 0.0];
+        let names = of_map + &of_sphere + if has_vertical { &of_heights } else { "" };
         vec![
             Field::text(270, &format!("{}; sphere {datum}, {radius_m} m", self.what)),
             Field::doubles(33_550, &[cell_m, cell_m, 0.0]),
@@ -218,39 +172,50 @@ impl<N: Number> GeoTiff<'_, N> {
             Field::shorts(34_735, &keys.concat()),
             Field::doubles(34_736, &numbers),
             Field::text(34_737, &names),
+            Field::text(42_112, &self.metadata()),
         ]
     }
 }
 
-impl<N: Number> Size<N> {
+impl<N> GeoTiff<'_, N> {
+    /// Name and unit of the band, as GDAL reads them.
+    fn metadata(&self) -> String {
+        let item = |name: &str, role: &str, text: &str| {
+            format!("<Item name=\"{name}\" sample=\"0\" role=\"{role}\">{text}</Item>\n")
+        };
+        let mut items = item("DESCRIPTION", "description", self.what);
+        if !self.unit.is_empty() {
+            items += &item("UNITTYPE", "unittype", self.unit);
+        }
+        format!("<GDALMetadata>\n{items}</GDALMetadata>\n")
+    }
+}
+
+impl<N: Number + Send + Sync> Size<N> {
     fn across(&self) -> [usize; 2] {
         [self.rows.div_ceil(TILE), self.columns.div_ceil(TILE)]
     }
 
-    fn tiles(&self) -> usize {
-        let [down, across] = self.across();
-        down * across
-    }
-
-    /// Layout of the numbers in the file, from the byte `begin` on.
-    fn fields(&self, begin: usize, is_reduced: bool) -> Vec<Field> {
-        let bytes = tile_bytes::<N>();
+    /// Layout of the numbers in the file, with offsets and lengths of tiles.
+    fn fields(&self, places: &[[usize; 2]], is_reduced: bool) -> Vec<Field> {
         let [bits, format] = N::LAYOUT;
-        let begins: Vec<usize> = (0..self.tiles()).map(|tile| begin + tile * bytes).collect();
+        let [begins, lengths]: [Vec<usize>; 2] =
+            [0, 1].map(|of| places.iter().map(|place| place[of]).collect());
         vec![
             Field::longs(254, &[usize::from(is_reduced)]),
             Field::longs(256, &[self.columns]),
             Field::longs(257, &[self.rows]),
-            // Not compressed, the least black, one of a cell.
+            // Deflate, the least black, one of a cell.
             Field::shorts(258, &[bits]),
-            Field::shorts(259, &[1]),
+            Field::shorts(259, &[8]),
             Field::shorts(262, &[1]),
             Field::shorts(277, &[1]),
+            Field::shorts(317, &[N::PREDICTOR]),
             Field::shorts(339, &[format]),
             Field::shorts(322, &[TILE]),
             Field::shorts(323, &[TILE]),
             Field::longs(324, &begins),
-            Field::longs(325, &vec![bytes; self.tiles()]),
+            Field::longs(325, &lengths),
         ]
     }
 
@@ -262,17 +227,22 @@ impl<N: Number> Size<N> {
         }
     }
 
-    /// Appends the tiles.
-    fn append(&self, bytes: &mut Vec<u8>) {
+    /// The tiles, row by row.
+    fn compressed(&self) -> Vec<Vec<u8>> {
         let [down, across] = self.across();
-        for tile in 0..down * across {
+        let tile = |tile: usize| {
             let [top, left] = [tile / across * TILE, tile % across * TILE];
+            let mut encoder = ZlibEncoder::new(Vec::new(), Compression::default());
             for row in top..top + TILE {
-                for column in left..left + TILE {
-                    self.number(row, column).append(bytes);
-                }
+                let numbers: Vec<N> = (left..left + TILE)
+                    .map(|column| self.number(row, column))
+                    .collect();
+                // Writing to memory cannot fail.
+                let _ = encoder.write_all(&N::predicted(&numbers));
             }
-        }
+            encoder.finish().unwrap_or_default()
+        };
+        (0..down * across).into_par_iter().map(tile).collect()
     }
 
     /// Means of two by two cells, of those that have a number.
@@ -294,74 +264,6 @@ impl<N: Number> Size<N> {
             numbers,
         }
     }
-}
-
-/// Bytes of a tile.
-const fn tile_bytes<N: Number>() -> usize {
-    TILE * TILE * N::LAYOUT[0] / 8
-}
-
-impl Field {
-    fn of(tag: u16, kind: u16, count: usize, bytes: Vec<u8>) -> Self {
-        Self {
-            tag,
-            kind,
-            count,
-            bytes,
-        }
-    }
-
-    fn shorts(tag: u16, numbers: &[usize]) -> Self {
-        let bytes = numbers.iter().flat_map(|number| {
-            let [low, high, ..] = long(*number);
-            [low, high]
-        });
-        Self::of(tag, SHORT, numbers.len(), bytes.collect())
-    }
-
-    fn longs(tag: u16, numbers: &[usize]) -> Self {
-        let bytes = numbers.iter().flat_map(|number| long(*number));
-        Self::of(tag, LONG, numbers.len(), bytes.collect())
-    }
-
-    fn doubles(tag: u16, numbers: &[f64]) -> Self {
-        let bytes = numbers.iter().flat_map(|number| number.to_le_bytes());
-        Self::of(tag, DOUBLE, numbers.len(), bytes.collect())
-    }
-
-    fn text(tag: u16, text: &str) -> Self {
-        let bytes: Vec<u8> = text.bytes().chain([0]).collect();
-        Self::of(tag, ASCII, bytes.len(), bytes)
-    }
-}
-
-/// A table at the byte `at`, followed by values that do not fit into it; then the next one.
-fn table(fields: &[Field], at: usize, is_last: bool) -> Vec<u8> {
-    let head = 2 + 12 * fields.len() + 4;
-    let mut bytes = long(fields.len())[..2].to_vec();
-    let mut behind: Vec<u8> = Vec::new();
-    for field in fields {
-        bytes.extend(field.tag.to_le_bytes());
-        bytes.extend(field.kind.to_le_bytes());
-        bytes.extend(long(field.count));
-        if field.bytes.len() <= 4 {
-            bytes.extend(&field.bytes);
-            bytes.resize(bytes.len() + 4 - field.bytes.len(), 0);
-        } else {
-            bytes.extend(long(at + head + behind.len()));
-            behind.extend(&field.bytes);
-            behind.resize(behind.len().next_multiple_of(2), 0);
-        }
-    }
-    let next = if is_last { 0 } else { at + head + behind.len() };
-    bytes.extend(long(next));
-    bytes.extend(behind);
-    bytes
-}
-
-/// Four bytes of a number; the largest grid has 100 MB.
-fn long(number: usize) -> [u8; 4] {
-    u32::try_from(number).unwrap_or(u32::MAX).to_le_bytes()
 }
 
 #[cfg(test)]
@@ -388,17 +290,17 @@ mod tests {
             parallel_rad: 0.2,
             body: Body::Mars,
             what: "numbers",
+            unit: "m",
+            vertical: "",
             numbers: &numbers,
         };
         let bytes = tiff.encoded();
-        let first_tile = bytes.len() - (3 * 2 + 2 + 1) * TILE * TILE * 4;
         let mut decoder = Decoder::new(Cursor::new(&bytes)).unwrap();
         let sizes = [(300, 600), (150, 300), (75, 150)];
-        let mut begins = Vec::new();
+        let (mut begins, mut tables) = (Vec::new(), Vec::new());
         for (number, size) in sizes.into_iter().enumerate() {
             assert_eq!(decoder.dimensions().unwrap(), size);
-            let at = decoder.ifd_pointer().unwrap().0;
-            assert!(usize::try_from(at).unwrap() < first_tile);
+            tables.push(decoder.ifd_pointer().unwrap().0);
             let offsets = decoder
                 .get_tag_u64_vec(tiff::tags::Tag::TileOffsets)
                 .unwrap();
@@ -419,5 +321,6 @@ mod tests {
         }
         assert!(!decoder.more_images());
         assert!(begins[0] > begins[1] && begins[1] > begins[2]);
+        assert!(tables.iter().all(|table| *table < begins[2]));
     }
 }

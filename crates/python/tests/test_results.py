@@ -371,7 +371,7 @@ def test_an_unknown_image_is_refused_with_the_images(result: Result) -> None:
 
 
 def test_a_product_that_the_site_lacks_is_refused_with_its_requirement(edited: Callable[[Edit], Path]) -> None:
-    lacking = without("ties.parquet", "height_check.parquet", "adjusted_isd.json", "surface.tif", "adjusted.tm")
+    lacking = without("ties.parquet", "height_check.parquet", "adjusted_isd.json", "surface_above_sphere.tif", "adjusted.tm")
     result = open_result(edited(lacking))
     for name, product in [("ties", "ties.parquet"), ("heights", "height_check.parquet")]:
         with pytest.raises(InputError, match=rf"has no {product}; expected a site with tie points: add \[ties\]"):

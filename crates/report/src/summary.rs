@@ -97,13 +97,14 @@ fn about(site: &SiteProducts) -> Markup {
 }
 
 /// Names of the products that most users take: paths, and file names of products of images.
-pub const DOWNLOADS: [&str; 8] = [
+pub const DOWNLOADS: [&str; 9] = [
     "footprints.parquet",
     "registered_footprints.parquet",
     "registered_footprints.csv",
     "exchange/registered_footprints.gpkg",
     "exchange/site.qgz",
-    "surface.tif",
+    "surface_above_areoid.tif",
+    "surface_above_sphere.tif",
     "orthoimage.tif",
     "adjusted_isd.json",
 ];

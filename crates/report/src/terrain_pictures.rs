@@ -41,9 +41,9 @@ const DIFFERENCES: [[f64; 3]; 3] = [
 const GROUND: u8 = 190;
 
 /// Numbers of the first and the last colour, their meaning, and the colours by their share.
-struct Bar {
+struct Bar<'a> {
     ends: [f64; 2],
-    words: &'static str,
+    words: &'a str,
     colour: fn(f64) -> [u8; 3],
 }
 
@@ -52,22 +52,24 @@ struct Bar {
 /// # Errors
 /// A picture that the library rejects, which is a bug in areograph.
 pub fn terrain_pictures(account: &SurfaceAccount, terms: &Terms<'_>) -> Result<Markup> {
-    let body = terms.body;
     let frame = Frame::of(&account.look);
     let exaggeration = frame.exaggeration();
-    let heights = &account.look.heights.heights_m;
+    // Every figure of a page refers to the same surface, by which people judge heights.
+    let known = account.reference.as_ref();
+    let surface = known.map_or("map sphere", |_| terms.areoid());
+    let heights = account.above_reference(&account.look.heights).heights_m;
+    let above = format!("height above the {surface}, m");
     let bar = Bar {
-        ends: ends(heights),
-        words: "height above the sphere, m",
+        ends: ends(&heights),
+        words: &above,
         colour: relief::colour,
     };
     let light = |at: usize| frame.light(at, exaggeration);
     let shaded = frame.figure(
         "Terrain model, shaded",
         &format!(
-            "Heights above the sphere of {} m, lit from the north-west; slopes are exaggerated {} times. {} % of the ground \
-             that both images show has a height.",
-            label(body.map().radius_m, 0),
+            "Heights above the {surface}, lit from the north-west; slopes are exaggerated {} times. {} % of the ground that \
+             both images show has a height.",
             label(exaggeration, 0),
             label(100.0 * account.filled_share(), 1)
         ),
@@ -199,7 +201,7 @@ impl<'a> Frame<'a> {
         &self,
         title: &str,
         caption: &str,
-        bar: &Bar,
+        bar: &Bar<'_>,
         colour: impl Fn(usize) -> [u8; 3],
         shots: &[ShotOnSurface],
     ) -> Result<Markup> {
@@ -229,7 +231,12 @@ impl<'a> Frame<'a> {
         Ok(figure_html(title, &svg, &[], caption, &csv(bar, shots)))
     }
 
-    fn draw_shots<'b>(&self, bar: &Bar, shots: &[ShotOnSurface], area: &Canvas<'b>) -> Drawn<'b> {
+    fn draw_shots<'b>(
+        &self,
+        bar: &Bar<'_>,
+        shots: &[ShotOnSurface],
+        area: &Canvas<'b>,
+    ) -> Drawn<'b> {
         let grid = &self.look.heights;
         let [rows, columns] = grid.size.map(|length| length as f64);
         for shot in thinned(shots, SHOTS) {
@@ -258,7 +265,7 @@ impl<'a> Frame<'a> {
     }
 }
 
-impl Bar {
+impl Bar<'_> {
     fn share(&self, number: f32) -> f64 {
         let [low, high] = self.ends;
         ((f64::from(number) - low) / (high - low).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0)
@@ -307,7 +314,7 @@ fn small(number: f64) -> f32 {
 }
 
 /// The numbers of a figure: of its shots, or of the ends of its colours.
-fn csv(bar: &Bar, shots: &[ShotOnSurface]) -> String {
+fn csv(bar: &Bar<'_>, shots: &[ShotOnSurface]) -> String {
     if shots.is_empty() {
         let [low, high] = bar.ends;
         return format!(

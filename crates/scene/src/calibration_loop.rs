@@ -10,6 +10,7 @@ use super::{
     error_sources::{Relief, Roughness},
     files::{Draft, put},
     line_images::LineImages,
+    mission::TrueGround,
     passes::Passes,
     pushbroom_pair::{Orbit, OrbitError, StereoLine},
     terrain::Terrain,
@@ -55,6 +56,14 @@ pub struct LineScene {
 }
 
 impl LineScene {
+    /// The ground of the scene.
+    #[must_use]
+    pub fn ground(&self) -> TrueGround {
+        let middle = orbit(self).ground(0.5, 0.0).normalize();
+        let relief = Relief::SelfAffine(Roughness::Rough);
+        TrueGround(Terrain::new(self.seed, &[middle], relief))
+    }
+
     /// Images of 65 by 22 km, support data with errors.
     #[must_use]
     pub const fn of_seed(seed: u64) -> Self {
@@ -180,8 +189,7 @@ pub fn write_line_scene(directory: &Path, scene: &LineScene, watch: Watch<'_>) -
     let [isd, images, pedr] = ["isd", "images", "pedr"].map(|folder| draft.folder(folder));
     let (isd, images, pedr) = (isd?, images?, pedr?);
     let (lines, orbit, passes) = (lines(scene), orbit(scene), scene.passes());
-    let middle = orbit.ground(0.5, 0.0).normalize();
-    let terrain = Terrain::new(seed, &[middle], Relief::SelfAffine(Roughness::Rough));
+    let TrueGround(terrain) = scene.ground();
     let rendered = LineImages {
         orbit: &orbit,
         terrain: &terrain,

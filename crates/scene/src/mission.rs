@@ -73,7 +73,7 @@ pub fn write_scene_with_images(
 
 /// The ground of the mission that [`write_scene`] writes.
 #[derive(Debug)]
-pub struct TrueGround(Terrain);
+pub struct TrueGround(pub(super) Terrain);
 
 impl TrueGround {
     /// The ground of the mission with these options.

@@ -20,6 +20,7 @@ pub mod describe_kernels;
 pub mod fit_sensor_model;
 pub mod group_profiles;
 pub mod intersect;
+pub mod join_surfaces;
 pub mod judge;
 pub mod lay_overlays;
 pub mod map_surface;

@@ -6,12 +6,9 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::{
-    capabilities::terrain::write_map,
-    error::{Locate as _, Result},
-    products::{
-        Content, Context, Declaration, GeoTiff, Role, SiteProducts, Write, error::ProductError,
-        read_bytes, write_bytes, write_json,
-    },
+    capabilities::terrain::{Band, write_map, write_raster},
+    error::Result,
+    products::{Content, Context, Declaration, GeoTiff, Role, SiteProducts, Write, write_json},
     schema::DocumentSchema,
     stages::{map_surface::Surface, rectify_images::Orthoimage},
 };
@@ -22,7 +19,7 @@ const SITES: &str = "a site with orthoimages";
 
 pub(super) static ORTHOIMAGE: Declaration = Declaration {
     path: "images/<image>/orthoimage.tif",
-    what: "orthoimage on the equirectangular map of surface.tif (cloud-optimised GeoTIFF): brightness 1 to 255 (pixel value 0 is \
+    what: "orthoimage on the equirectangular map of surface_above_sphere.tif (cloud-optimised GeoTIFF): brightness 1 to 255 (pixel value 0 is \
            stored as 1), or 0 in cells that have no height, are hidden by relief or lack pixels",
     readers: "GIS",
     rows: "cells with a brightness",
@@ -42,7 +39,7 @@ pub(super) static ORTHOIMAGE: Declaration = Declaration {
 pub(super) static SIGMAS: Declaration = Declaration {
     path: "images/<image>/orthoimage_sigma.tif",
     what: "standard deviation of horizontal positions in the orthoimage (both axes together, without the shared error), metres, \
-           on the cells of surface.tif: due to height errors, jitter and drift; orthoimages.json states the shared error",
+           on the cells of surface_above_sphere.tif: due to height errors, jitter and drift; orthoimages.json states the shared error",
     readers: "GIS",
     rows: "cells that the image shows",
     role: Role::Data,
@@ -51,11 +48,14 @@ pub(super) static SIGMAS: Declaration = Declaration {
         images: IMAGES,
         has: has_orthoimage,
         write: |path, of, image| {
-            let what = "standard deviation of the horizontal position, metres";
+            let band = Band {
+                what: "standard deviation of the horizontal position",
+                unit: "m",
+            };
             let terrain = of.site.find::<Surface>()?;
             let made = orthoimage(of.site, image)?.zip(terrain);
             made.map_or(Ok(0), |(image, Surface { model, .. })| {
-                let numbers = (what, &*image.sigmas_m);
+                let numbers = (band, &*image.sigmas_m);
                 write_map(path, of, &model.heights, numbers, model.parallel_rad)
             })
         },
@@ -109,15 +109,11 @@ fn write_brightness(path: &Path, of: &Context, image: &Orthoimage) -> Result<u64
         parallel_rad: image.account.parallel_rad,
         body: of.site.config.body,
         what: "brightness of an image",
+        unit: "",
+        vertical: "",
         numbers: &image.brightness,
     };
-    let bytes = file.encoded();
-    write_bytes(path, &bytes)?;
-    if read_bytes(path)? != bytes {
-        let what = format!("{} bytes of an orthoimage", bytes.len());
-        return Err(ProductError::ReadBack { what }).in_file(path);
-    }
-    Ok(u64::from(image.account.filled))
+    write_raster(path, &file)
 }
 
 /// `orthoimages.json`.

@@ -5,6 +5,7 @@ use std::{borrow::Cow, collections::BTreeMap};
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::{contour_interval::contour_interval_m, joint_document::JointDocument};
 use crate::{
     geom::statistics::Summary,
     products::Context,
@@ -60,7 +61,7 @@ const DEFINITIONS: [(&str, &str); 7] = [
 #[derive(Serialize, JsonSchema)]
 #[schemars(
     title = "Terrain model of a site",
-    description = "surface.json of areograph: derivation of surface.tif from a pair of images, statistics of its cells, and \
+    description = "surface.json of areograph: derivation of surface_above_sphere.tif from pairs of images, statistics of its cells, and \
          differences between footprints and model. Metres and degrees; unknown values are omitted."
 )]
 pub(super) struct Document<'a> {
@@ -69,9 +70,12 @@ pub(super) struct Document<'a> {
     site: &'a str,
     #[schemars(length(min = 1))]
     definitions: Vec<Definition>,
-    /// Identifiers of both images.
-    images: [&'a str; 2],
-    /// Whether too few cells matched to be significant: then there is no surface.tif.
+    /// Identifiers of the images; of both images of a single pair.
+    images: Vec<&'a str>,
+    /// Pairs of images, where there are several; the numbers outside are sums of cells and means over all pairs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    joint: Option<JointDocument<'a>>,
+    /// Whether too few cells matched to be significant: then there is no `surface_above_sphere.tif`.
     refused: bool,
     matching: Matching,
     cells: Cells,
@@ -118,8 +122,19 @@ struct Cells {
 
 #[derive(Serialize, JsonSchema)]
 struct Heights {
-    /// Radius of the sphere to which the heights refer.
+    /// Radius of the sphere to which the heights of `surface_above_sphere.tif` refer.
     sphere_m: f64,
+    /// Surface to which the heights of the report and of `surface_above_areoid.tif` or `surface_above_ellipsoid.tif` refer;
+    /// omitted without shots.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reference: Option<&'static str>,
+    /// Largest distance of this surface from its radius as shots state it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reference_departure_m: Option<f64>,
+    /// Largest standard deviation of this surface at the corners of the model: shots of a single profile do not determine its
+    /// gradient across the profile.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reference_sigma_m: Option<f64>,
     #[schemars(range(min = 0.0))]
     sigma_m: f64,
     #[schemars(range(min = 0.0))]
@@ -128,6 +143,9 @@ struct Heights {
     smoothing_m: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     common_sigma_m: Option<f64>,
+    /// Interval of the contours, metres: 1, 2 or 5 times a power of ten, at least 3.29 times `sigma_m` and 1/25 of the relief.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    contour_interval_m: f64,
 }
 
 #[derive(Serialize, JsonSchema)]
@@ -149,6 +167,13 @@ impl<'a> Document<'a> {
         let account = &surface.account;
         let [rows, columns] = surface.model.heights.size;
         let terms = of.site.config.terms();
+        let reference = account.reference.as_ref();
+        let mut images = account.images.to_vec();
+        if let Some(joint) = &account.joint {
+            images = joint.pairs.iter().flat_map(|pair| pair.images).collect();
+            images.sort_unstable();
+            images.dedup();
+        }
         let definitions = DEFINITIONS.iter().map(|(of, is)| Definition {
             of,
             is: terms.fill(is),
@@ -158,7 +183,14 @@ impl<'a> Document<'a> {
             format: "areograph surface 1",
             site: &of.site.config.site,
             definitions: definitions.collect(),
-            images: account.images.map(|image| &*of.site.images[image].times.id),
+            images: images
+                .iter()
+                .map(|image| &*of.site.images[*image].times.id)
+                .collect(),
+            joint: account
+                .joint
+                .as_ref()
+                .map(|joint| JointDocument::of(of.site, joint)),
             refused: account.is_refused,
             matching: Matching {
                 sample_m: account.sample_m,
@@ -178,10 +210,14 @@ impl<'a> Document<'a> {
             },
             heights: Heights {
                 sphere_m: surface.model.heights.radius_m,
+                reference: reference.map(|_| terms.areoid()),
+                reference_departure_m: reference.map(|of| of.departure_m),
+                reference_sigma_m: reference.map(|of| of.sigma_m),
                 sigma_m: account.sigma_m,
                 jitter_m: account.jitter_m,
                 smoothing_m: account.smoothing_m,
                 common_sigma_m: account.common_sigma_m,
+                contour_interval_m: contour_interval_m(account),
             },
             mola_minus_surface: Shots {
                 mola_takes_part: account.shots_take_part,

@@ -8,17 +8,18 @@ use crate::{
     geom::height_grid::HeightGrid,
     pds::terrain_model::{HeightsAbove, read_terrain_model},
     products::{
-        Content, Context, Declaration, GeoTiff, Role, SiteProducts, Write, error::ProductError,
-        write_bytes, write_json,
+        Content, Context, Declaration, GeoTiff, Number, Role, SiteProducts, Write,
+        error::ProductError, read_bytes, write_bytes, write_json,
     },
     schema::DocumentSchema,
     stages::map_surface::{Surface, SurfaceModel},
 };
 
-pub(super) static HEIGHTS: Declaration = Declaration {
-    path: "surface.tif",
-    what: "terrain model from a pair of images (cloud-optimised GeoTIFF): heights above the sphere of the body's maps, \
-           metres, on an equirectangular map; -32768 in cells without a height",
+/// A terrain model above the sphere of the maps, which programs for digital terrain expect.
+pub(super) static ABOVE_SPHERE: Declaration = Declaration {
+    path: "surface_above_sphere.tif",
+    what: "terrain model (cloud-optimised GeoTIFF): heights above the sphere of the body's maps, metres, on an equirectangular \
+           map; -32768 in cells without a height",
     readers: "GIS, Ames Stereo Pipeline, `areograph pedr match`",
     rows: "cells with a height",
     role: Role::Data,
@@ -27,18 +28,52 @@ pub(super) static HEIGHTS: Declaration = Declaration {
         sites: WITH_A_MODEL,
         has: has_model,
         write: |path, of| {
-            let what = "height above the sphere, metres";
-            write_cells(path, of, what, |model| &model.heights.heights_m)
+            let band = Band {
+                what: "height above the map sphere",
+                unit: "m",
+            };
+            write_cells(path, of, band, |model| &model.heights.heights_m)
         },
+    },
+    uses: &[],
+};
+
+pub(super) static ABOVE_AREOID: Declaration = Declaration {
+    path: "surface_above_areoid.tif",
+    what: "the same terrain model (cloud-optimised GeoTIFF): heights above the areoid, metres, in the same cells; the \
+           areoid is that of the shots, and surface.json states its departure from them; the vertical system is part of the file",
+    readers: "GIS",
+    rows: "cells with a height",
+    role: Role::Data,
+    content: Content::Foreign,
+    write: Write::Where {
+        sites: "a site with a terrain model and shots with areoid radii",
+        has: |site| matches!(reference_file(site), Some(("areoid", _))),
+        write: |path, of| write_above(path, of, "areoid"),
+    },
+    uses: &[],
+};
+
+pub(super) static ABOVE_ELLIPSOID: Declaration = Declaration {
+    path: "surface_above_ellipsoid.tif",
+    what: "the same terrain model (cloud-optimised GeoTIFF): heights above the ellipsoid of the body, metres, in the same \
+           cells; the vertical system is part of the file",
+    readers: "GIS",
+    rows: "cells with a height",
+    role: Role::Data,
+    content: Content::Foreign,
+    write: Write::Where {
+        sites: "a site on Mars with a terrain model and shots without areoid radii",
+        has: |site| matches!(reference_file(site), Some(("ellipsoid", _))),
+        write: |path, of| write_above(path, of, "ellipsoid"),
     },
     uses: &[],
 };
 
 pub(super) static SIGMAS: Declaration = Declaration {
     path: "surface_sigma.tif",
-    what: "standard deviations of the heights in surface.tif about their common offset, metres, in the same cells: \
-           due to matching, jitter and relief inside the compared square; surface.json states the standard deviation \
-           of the offset",
+    what: "standard deviations of the heights of the terrain model about their common offset, metres, in the same cells: due to \
+           matching, jitter and relief inside the compared square; surface.json states the standard deviation of the offset",
     readers: "GIS, Ames Stereo Pipeline",
     rows: "cells with a height",
     role: Role::Data,
@@ -47,8 +82,11 @@ pub(super) static SIGMAS: Declaration = Declaration {
         sites: WITH_A_MODEL,
         has: has_model,
         write: |path, of| {
-            let what = "standard deviation of the height about the common offset, metres";
-            write_cells(path, of, what, |model| &model.sigmas_m)
+            let band = Band {
+                what: "standard deviation of the height about the common offset",
+                unit: "m",
+            };
+            write_cells(path, of, band, |model| &model.sigmas_m)
         },
     },
     uses: &[],
@@ -76,32 +114,100 @@ pub(super) static DOCUMENT: Declaration = Declaration {
 };
 
 /// Sites with these products.
-const WITH_A_MODEL: &str = "a site with a terrain model";
+pub(super) const WITH_A_MODEL: &str = "a site with a terrain model";
 
 /// The terrain model of a site, where enough cells matched.
-fn significant<'a>(site: &SiteProducts<'a>) -> Result<Option<&'a SurfaceModel>> {
+pub(super) fn significant<'a>(site: &SiteProducts<'a>) -> Result<Option<&'a SurfaceModel>> {
     let surface = site.find::<Surface>()?;
     let significant = surface.filter(|surface| !surface.account.is_refused);
     Ok(significant.map(|surface| &surface.model))
 }
 
 /// Whether the site has one. The writer reports an output that cannot be read.
-fn has_model(site: &SiteProducts) -> bool {
+pub(super) fn has_model(site: &SiteProducts) -> bool {
     !matches!(significant(site), Ok(None))
+}
+
+/// The surface other than the sphere above which the heights of a site are known, and their file.
+pub(super) fn reference_file(site: &SiteProducts) -> Option<(&'static str, &'static Declaration)> {
+    let surface = site.find::<Surface>();
+    // The writer reports an output that cannot be read.
+    let is_known = !matches!(surface, Ok(Some(surface)) if surface.account.reference.is_none());
+    let terms = site.config.terms();
+    let of = if terms.has_areoid {
+        &ABOVE_AREOID
+    } else {
+        &ABOVE_ELLIPSOID
+    };
+    let ellipsoid = terms.body.model();
+    let is_apart = terms.has_areoid || ellipsoid.equatorial_radius_m > ellipsoid.polar_radius_m;
+    (is_known && is_apart && has_model(site)).then_some((terms.areoid(), of))
+}
+
+/// Name and unit of the numbers of a file.
+pub(in crate::capabilities) struct Band<'a> {
+    pub(in crate::capabilities) what: &'a str,
+    pub(in crate::capabilities) unit: &'a str,
 }
 
 /// Writes the values of all cells of the model.
 fn write_cells(
     path: &Path,
     of: &Context,
-    what: &str,
+    band: Band<'_>,
     numbers: fn(&SurfaceModel) -> &[f32],
 ) -> Result<u64> {
     let Some(model) = significant(of.site)? else {
         return Ok(0);
     };
-    let numbers = (what, numbers(model));
-    write_map(path, of, &model.heights, numbers, model.parallel_rad)
+    let numbers = numbers(model);
+    write_map(
+        path,
+        of,
+        &model.heights,
+        (band, numbers),
+        model.parallel_rad,
+    )
+}
+
+/// Writes the heights of all cells above `surface`.
+fn write_above(path: &Path, of: &Context, surface: &str) -> Result<u64> {
+    let model = significant(of.site)?;
+    model.map_or(Ok(0), |model| above(path, of, surface, model))
+}
+
+/// Writes the heights of all cells of a model of the site above `surface`.
+pub(super) fn above(path: &Path, of: &Context, surface: &str, model: &SurfaceModel) -> Result<u64> {
+    let known = of.site.find::<Surface>()?;
+    let Some(reference) = known.and_then(|known| known.account.reference.as_ref()) else {
+        return Ok(0);
+    };
+    let numbers = reference.heights_m(&model.heights);
+    let file = GeoTiff {
+        grid: &model.heights,
+        parallel_rad: model.parallel_rad,
+        body: of.site.config.body,
+        what: &format!("height above the {surface}"),
+        unit: "m",
+        vertical: surface,
+        numbers: &numbers,
+    };
+    write_raster(path, &file)
+}
+
+/// Writes a file and reads it back; returns the number of its cells with a number.
+pub(in crate::capabilities) fn write_raster<N: Number + Send + Sync>(
+    path: &Path,
+    file: &GeoTiff<'_, N>,
+) -> Result<u64> {
+    let bytes = file.encoded();
+    write_bytes(path, &bytes)?;
+    if read_bytes(path)? != bytes {
+        let what = format!("{} bytes of {}", bytes.len(), file.what);
+        return Err(ProductError::ReadBack { what }).in_file(path);
+    }
+    let known = file.numbers.iter().filter(|number| !number.is_none());
+    Ok(known.count() as u64)
 }
 
 /// Writes the values of all cells, and reads them back like any terrain model.
@@ -109,7 +215,7 @@ pub(in crate::capabilities) fn write_map(
     path: &Path,
     of: &Context,
     grid: &HeightGrid,
-    (what, numbers): (&str, &[f32]),
+    (Band { what, unit }, numbers): (Band<'_>, &[f32]),
     parallel_rad: f64,
 ) -> Result<u64> {
     let body = of.site.config.body;
@@ -118,6 +224,8 @@ pub(in crate::capabilities) fn write_map(
         parallel_rad,
         body,
         what,
+        unit,
+        vertical: "",
         numbers,
     };
     write_bytes(path, &file.encoded())?;

@@ -2,6 +2,12 @@
 
 use maud::{Markup, html};
 
+use super::{
+    contour_interval::contour_interval_m,
+    joint::tables,
+    products::{ABOVE_SPHERE, SIGMAS, reference_file},
+    relief::{CONTOURS, HILLSHADE, SLOPES},
+};
 use crate::{
     error::Result,
     geom::statistics::Summary,
@@ -43,12 +49,19 @@ fn write(site: &SiteProducts, account: &SurfaceAccount) -> Result<Markup> {
         return Ok(html! { p { (words) } (table) });
     }
     let pictures = terrain_pictures(account, &site.config.terms())?;
+    let file = |name: &str| link(&format!("../{name}"), name);
     Ok(html! {
         p {
-            "Heights above the sphere of the body's maps: " (link("../surface.tif", "surface.tif"))
-            "; their standard deviations: " (link("../surface_sigma.tif", "surface_sigma.tif")) "."
+            @if let Some((surface, of)) = reference_file(site) {
+                "Heights above the " (surface) ", as in the figures: " (file(of.path)) ". "
+            }
+            "Heights above the sphere of the body's maps, for programs that expect this reference: "
+            (file(ABOVE_SPHERE.path)) ". Standard deviations: " (file(SIGMAS.path))
+            ". Shading: " (file(HILLSHADE.path)) ". Slopes: " (file(SLOPES.path))
+            ". Contours every " (label(contour_interval_m(account), 2)) " m: " (file(CONTOURS.path)) "."
         }
         (table)
+        @if let Some(joint) = &account.joint { (tables(site, joint, site.config.terms().altimeter)) }
         (compared(account, site.config.terms().altimeter))
         div.plots { (pictures) }
     })
@@ -57,7 +70,7 @@ fn write(site: &SiteProducts, account: &SurfaceAccount) -> Result<Markup> {
 /// Making of the model, and outcomes of its cells.
 fn made(site: &SiteProducts, account: &SurfaceAccount) -> Markup {
     let mut table = Table::new(
-        "Terrain model from a pair of images",
+        "Terrain model from pairs of images",
         &[
             Column::Text("images"),
             Column::Number("cell (m)"),
@@ -73,6 +86,15 @@ fn made(site: &SiteProducts, account: &SurfaceAccount) -> Markup {
         ],
     );
     let [first, second] = account.images.map(|image| &site.images[image].times.id);
+    let images = account.joint.as_ref().map_or_else(
+        || format!("{first}, {second}"),
+        |joint| {
+            format!(
+                "{} pairs",
+                joint.pairs.iter().filter(|of| of.bit.is_some()).count()
+            )
+        },
+    );
     let common = account.common_sigma_m.map_or_else(
         || Cell::from("not known"),
         |sigma_m| Cell::from(label(sigma_m, 1)).traced("/heights/common_sigma_m"),
@@ -83,7 +105,7 @@ fn made(site: &SiteProducts, account: &SurfaceAccount) -> Markup {
         "surface.json#",
         !account.is_refused,
         [
-            format!("{first}, {second}").into(),
+            images.into(),
             of(account.cell_m, 1, "/cells/cell_m"),
             of(account.compared_m, 0, "/matching/compared_m"),
             Cell::from(whole(account.cells)).traced("/cells/common"),

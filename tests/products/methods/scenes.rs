@@ -100,6 +100,7 @@ pub(crate) static SHORT: [Scene; 6] = [
             ("check_ranges", "CheckTableRanges"),
             ("match_ties", "MatchTies"),
             ("map_surface", "MapSurface"),
+            ("join_surfaces", "JoinSurfaces"),
             (PUBLISH, "flow/publish.rs"),
         ],
     },
@@ -221,7 +222,7 @@ fn run_model(folder: &Path) -> PathBuf {
 
 const LEAP_SECONDS: &str = include_str!("../../../kernels.example/leapseconds.tls");
 
-/// Two images by support data with their pixels, and the shots of passes over them in a table.
+/// Three images by support data with their pixels, and the shots of passes over them in a table.
 const PAIR: &str = r#"site = "pair"
 kernels.files = ["leapseconds.tls"]
 [[shots]]
@@ -239,19 +240,23 @@ pixels = "first/images/s1.tif"
 id = "nd"
 isd = "second/isd/nd.json"
 pixels = "second/images/nd.tif"
+[[images]]
+id = "s2"
+isd = "third/isd/s2.json"
+pixels = "third/images/s2.tif"
 [ties]
 match = true
 [surface]
 cell_m = 200.0
 orthoimage_cell_m = 50.0
-images = ["s1", "nd"]
+filled = true
 [registration]
 model = "samples"
 "#;
 
 fn write_pair(folder: &Path) {
     // Files of pixels without labels differ by their sizes; the ground is the same.
-    for (name, lines) in [("first", 400), ("second", 390)] {
+    for (name, lines) in [("first", 400), ("second", 390), ("third", 380)] {
         let scene = LineScene {
             seed: 1,
             size: [lines, 240],

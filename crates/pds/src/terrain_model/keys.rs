@@ -22,6 +22,7 @@ const FALSE_EASTING: u16 = 3082;
 const FALSE_NORTHING: u16 = 3083;
 const CENTRE_LONGITUDE: u16 = 3088;
 const CENTRE_LATITUDE: u16 = 3089;
+const VERTICAL: u16 = 4096;
 
 /// Values of keys.
 const PROJECTED: f64 = 1.0;
@@ -97,6 +98,11 @@ impl GeoKeys {
     pub(super) fn is_point(&self) -> bool {
         self.get(RASTER_TYPE)
             .is_some_and(|value| is_code(value, POINT))
+    }
+
+    /// Whether the file states a vertical system: its heights are not counted from the sphere.
+    pub(super) fn is_vertical(&self) -> bool {
+        self.get(VERTICAL).is_some()
     }
 
     /// Radius of the sphere, where the file states it.
@@ -234,6 +240,15 @@ mod tests {
         assert!(
             place.is_ok_and(|place| (place[0] - expected[0]).hypot(place[1] - expected[1]) < 1e-12)
         );
+    }
+
+    #[test]
+    fn a_vertical_system_is_noticed() {
+        let with = [DIRECTORY.as_slice(), &[4096, 0, 1, 32_767]].concat();
+        let keys = GeoKeys::of(&with, &DOUBLES).unwrap_or_default();
+        assert!(keys.is_vertical());
+        let keys = GeoKeys::of(&DIRECTORY, &DOUBLES).unwrap_or_default();
+        assert!(!keys.is_vertical());
     }
 
     #[test]

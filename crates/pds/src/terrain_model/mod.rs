@@ -96,6 +96,15 @@ pub enum TerrainModelError {
         /// Its expected radius.
         expected: f64,
     },
+    /// Heights above a surface other than a sphere.
+    #[error(
+        "the file states a vertical system, from which its heights are counted; expected heights above the sphere of the map"
+    )]
+    #[cause(
+        "give heights above the sphere (areograph writes surface_above_sphere.tif), or state the radius of their sphere \
+         with --radius-m"
+    )]
+    Vertical,
     /// A value that cannot be a height.
     #[error(
         "row {row}, column {column} (from 0) has the height {value}; expected a height within {HEIGHT_MAX_M} m of the sphere"
@@ -181,6 +190,9 @@ impl Tags {
         let [rows, columns] = self.size;
         if u64::from(rows) * u64::from(columns) > CELLS_MAX {
             return Err(TerrainModelError::TooLarge { rows, columns }.into());
+        }
+        if self.keys.is_vertical() && above.radius_m.is_none() {
+            return Err(TerrainModelError::Vertical.into());
         }
         let of_file = self.keys.radius_m()?;
         let radius_m = radius_m(of_file, above)?;

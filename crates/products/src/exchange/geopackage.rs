@@ -1,4 +1,4 @@
-//! Points as a GeoPackage (OGC 12-128r18, version 1.3): three-dimensional points, one table.
+//! Points or lines as a GeoPackage (OGC 12-128r18, version 1.3): three-dimensional points, or lines, in one table.
 //!
 //! SQLite itself writes the file. There is no spatial index: it is an extension, and readers make their own.
 
@@ -61,24 +61,69 @@ const LAYOUT: &str = "
 const WGS84_WKT: &str = "GEOGCS[\"WGS 84\",DATUM[\"WGS_1984\",SPHEROID[\"WGS 84\",6378137,298.257223563]],\
     PRIMEM[\"Greenwich\",0],UNIT[\"degree\",0.0174532925199433],AUTHORITY[\"EPSG\",\"4326\"]]";
 
+/// Geometries of a table.
+pub(crate) enum Geometries {
+    /// Longitude (-180..180), latitude, degrees, and height.
+    Points(Vec<[f64; 3]>),
+    /// Longitude, of any turn, and latitude, degrees.
+    Lines(Vec<Vec<[f64; 2]>>),
+}
+
+/// The table of a file.
+pub(crate) struct Layer<'a> {
+    /// Name of the layer.
+    pub(crate) name: &'a str,
+    /// Name of the table.
+    pub(crate) table: &'static str,
+    /// Description of the layer.
+    pub(crate) description: String,
+    /// UTC of the newest data: a clock would give different bytes each time.
+    pub(crate) newest_utc: String,
+    pub(crate) body: Body,
+    /// Frame of longitudes and latitudes.
+    pub(crate) frame: &'static str,
+    pub(crate) geometries: Geometries,
+    /// A row per geometry.
+    pub(crate) attributes: Table<'a>,
+}
+
+impl<'a> Layer<'a> {
+    fn of_points(features: Features<'a>) -> Self {
+        Self {
+            name: features.name,
+            table: features.table,
+            description: features.z,
+            newest_utc: features.newest_utc,
+            body: features.body,
+            frame: features.frame,
+            geometries: Geometries::Points(features.points),
+            attributes: features.attributes.for_gis(),
+        }
+    }
+}
+
 /// Writes the points and reads them back.
 ///
 /// # Errors
-/// Numbers that are not finite; errors of the disk or SQLite; rows that are read back differently.
+/// As [`write_layer`].
 pub(crate) fn write(path: &Path, features: Features) -> Result<u64> {
-    let features = Features {
-        attributes: features.attributes.for_gis(),
-        ..features
-    };
-    // Makes the folder and an empty file, which SQLite takes for a new database.
-    finish(path, create(path)?)?;
-    fill(path, &features).in_file(path)?;
-    read_back(path, &features).in_file(path)?;
-    Ok(features.points.len() as u64)
+    write_layer(path, &Layer::of_points(features))
 }
 
-/// The statement that makes the table of the points.
-fn create_table(table: &str, attributes: &Table) -> String {
+/// Writes a layer and reads it back.
+///
+/// # Errors
+/// Numbers that are not finite; errors of the disk or SQLite; rows that are read back differently.
+pub(crate) fn write_layer(path: &Path, layer: &Layer) -> Result<u64> {
+    // Makes the folder and an empty file, which SQLite takes for a new database.
+    finish(path, create(path)?)?;
+    fill(path, layer).in_file(path)?;
+    read_back(path, layer).in_file(path)?;
+    Ok(layer.geometries.len() as u64)
+}
+
+/// The statement that makes the table of the geometries.
+fn create_table(layer: &Layer) -> String {
     let column = |column: &Meaning| {
         let kind = match column.kind {
             Kind::Real => "DOUBLE",
@@ -91,13 +136,15 @@ fn create_table(table: &str, attributes: &Table) -> String {
         let missing = if column.optional { "" } else { " NOT NULL" };
         format!(", {} {kind}{missing}", column.name)
     };
-    let columns: String = attributes.columns().map(column).collect();
+    let columns: String = layer.attributes.columns().map(column).collect();
     format!(
-        "CREATE TABLE {table} (fid INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL, geom POINT NOT NULL{columns})"
+        "CREATE TABLE {} (fid INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL, geom {} NOT NULL{columns})",
+        layer.table,
+        layer.geometries.kind()
     )
 }
 
-/// The columns of the points as statements list them.
+/// The columns of the table as statements list them.
 fn names(attributes: &Table) -> String {
     let names = attributes.columns().map(|column| column.name);
     ["geom"]
@@ -127,11 +174,11 @@ fn value(values: &Values, row: usize) -> Value {
 }
 
 /// Calls `take` with every row, its geometry first.
-fn each(features: &Features, mut take: impl FnMut(Vec<Value>) -> Result<()>) -> Result<()> {
-    for rows in features.attributes.pieces() {
-        let values = features.attributes.values(rows.clone())?;
-        for (row, point) in features.points[rows].iter().enumerate() {
-            let geometry = Value::Blob(geometry(features.body, point));
+fn each(layer: &Layer, mut take: impl FnMut(Vec<Value>) -> Result<()>) -> Result<()> {
+    for rows in layer.attributes.pieces() {
+        let values = layer.attributes.values(rows.clone())?;
+        for (row, at) in rows.enumerate() {
+            let geometry = Value::Blob(layer.geometries.encoded(layer.body, at));
             let attributes = values.iter().map(|of| value(of, row));
             take([geometry].into_iter().chain(attributes).collect())?;
         }
@@ -150,13 +197,13 @@ fn refused(error: rusqlite::Error) -> Error {
     }
 }
 
-fn fill(path: &Path, features: &Features) -> Result<()> {
+fn fill(path: &Path, layer: &Layer) -> Result<()> {
     let database = Connection::open(path).map_err(refused)?;
     database.execute_batch(LAYOUT).map_err(refused)?;
-    let table = create_table(features.table, &features.attributes);
+    let table = create_table(layer);
     database.execute_batch(&table).map_err(refused)?;
-    describe(&database, features).map_err(refused)?;
-    let names = names(&features.attributes);
+    describe(&database, layer).map_err(refused)?;
+    let names = names(&layer.attributes);
     let places = names
         .split(", ")
         .map(|_| "?")
@@ -165,10 +212,10 @@ fn fill(path: &Path, features: &Features) -> Result<()> {
     let mut insert = database
         .prepare(&format!(
             "INSERT INTO {} ({names}) VALUES ({places})",
-            features.table
+            layer.table
         ))
         .map_err(refused)?;
-    each(features, |row| {
+    each(layer, |row| {
         insert.execute(params_from_iter(row)).map_err(refused)?;
         Ok(())
     })?;
@@ -178,8 +225,8 @@ fn fill(path: &Path, features: &Features) -> Result<()> {
 }
 
 /// Fills the tables of contents.
-fn describe(database: &Connection, features: &Features) -> rusqlite::Result<()> {
-    let (map, wkt) = (features.body.map(), crs_wkt(features.body));
+fn describe(database: &Connection, layer: &Layer) -> rusqlite::Result<()> {
+    let (map, wkt) = (layer.body.map(), crs_wkt(layer.body));
     let systems = "INSERT INTO gpkg_spatial_ref_sys VALUES (?, ?, ?, ?, ?, ?)";
     for (name, id, organization, definition, description) in [
         ("Undefined Cartesian SRS", -1, "NONE", "undefined", ""),
@@ -191,21 +238,20 @@ fn describe(database: &Connection, features: &Features) -> rusqlite::Result<()> 
             i64::from(map.code),
             "IAU_2015",
             &*wkt,
-            features.frame,
+            layer.frame,
         ),
     ] {
         let row = params![name, id, organization, id, definition, description];
         database.execute(systems, row)?;
     }
-    let axis = |axis: usize| ends(features.points.iter().map(|point| point[axis]));
-    let ([west, east], [south, north]) = (axis(0), axis(1));
+    let [[west, east], [south, north]] = [0, 1].map(|axis| layer.geometries.ends(axis));
     database.execute(
         "INSERT INTO gpkg_contents VALUES (?, 'features', ?, ?, ?, ?, ?, ?, ?, ?)",
         params![
-            features.table,
-            features.name,
-            features.z,
-            format!("{}Z", features.newest_utc),
+            layer.table,
+            layer.name,
+            layer.description,
+            format!("{}Z", layer.newest_utc),
             west,
             south,
             east,
@@ -214,8 +260,13 @@ fn describe(database: &Connection, features: &Features) -> rusqlite::Result<()> 
         ],
     )?;
     database.execute(
-        "INSERT INTO gpkg_geometry_columns VALUES (?, 'geom', 'POINT', ?, 1, 0)",
-        params![features.table, map.code],
+        "INSERT INTO gpkg_geometry_columns VALUES (?, 'geom', ?, ?, ?, 0)",
+        params![
+            layer.table,
+            layer.geometries.kind(),
+            map.code,
+            layer.geometries.has_heights()
+        ],
     )?;
     Ok(())
 }
@@ -228,33 +279,70 @@ fn ends(values: impl Iterator<Item = f64>) -> [f64; 2] {
     )
 }
 
-/// `GeoPackageBinary` without an envelope (2.1.3), around the well-known binary of a point with a height.
-fn geometry(body: Body, point: &[f64; 3]) -> Vec<u8> {
-    const VERSION: u8 = 0;
-    const LITTLE_ENDIAN: u8 = 1;
-    const POINT_Z: u32 = 1001;
-    let mut bytes = vec![b'G', b'P', VERSION, LITTLE_ENDIAN];
-    bytes.extend(body.map().code.to_le_bytes());
-    bytes.push(LITTLE_ENDIAN);
-    bytes.extend(POINT_Z.to_le_bytes());
-    for coordinate in point {
-        bytes.extend(coordinate.to_le_bytes());
+impl Geometries {
+    const fn len(&self) -> usize {
+        match self {
+            Self::Points(points) => points.len(),
+            Self::Lines(lines) => lines.len(),
+        }
     }
-    bytes
+
+    const fn kind(&self) -> &'static str {
+        match self {
+            Self::Points(_) => "POINT",
+            Self::Lines(_) => "LINESTRING",
+        }
+    }
+
+    const fn has_heights(&self) -> bool {
+        matches!(self, Self::Points(_))
+    }
+
+    /// Least and greatest coordinate on an axis.
+    fn ends(&self, axis: usize) -> [f64; 2] {
+        match self {
+            Self::Points(points) => ends(points.iter().map(|point| point[axis])),
+            Self::Lines(lines) => ends(lines.iter().flatten().map(|point| point[axis])),
+        }
+    }
+
+    /// `GeoPackageBinary` without an envelope (2.1.3), around the well-known binary of a geometry.
+    fn encoded(&self, body: Body, at: usize) -> Vec<u8> {
+        const VERSION: u8 = 0;
+        const LITTLE_ENDIAN: u8 = 1;
+        const POINT_Z: u32 = 1001;
+        const LINE: u32 = 2;
+        let mut bytes = vec![b'G', b'P', VERSION, LITTLE_ENDIAN];
+        bytes.extend(body.map().code.to_le_bytes());
+        bytes.push(LITTLE_ENDIAN);
+        let coordinates: &[f64] = match self {
+            Self::Points(points) => {
+                bytes.extend(POINT_Z.to_le_bytes());
+                &points[at]
+            }
+            Self::Lines(lines) => {
+                bytes.extend(LINE.to_le_bytes());
+                let count = u32::try_from(lines[at].len()).unwrap_or(u32::MAX);
+                bytes.extend(count.to_le_bytes());
+                lines[at].as_flattened()
+            }
+        };
+        for coordinate in coordinates {
+            bytes.extend(coordinate.to_le_bytes());
+        }
+        bytes
+    }
 }
 
-fn read_back(path: &Path, features: &Features) -> Result<()> {
+fn read_back(path: &Path, layer: &Layer) -> Result<()> {
     let unreadable = |error: rusqlite::Error| Error::from(ProductError::unreadable(error));
     let differs = |what: String| Err(ProductError::ReadBack { what }.into());
     let database =
         Connection::open_with_flags(path, OpenFlags::SQLITE_OPEN_READ_ONLY).map_err(unreadable)?;
-    let names = names(&features.attributes);
+    let names = names(&layer.attributes);
     let columns = names.split(", ").count();
     let mut select = database
-        .prepare(&format!(
-            "SELECT {names} FROM {} ORDER BY fid",
-            features.table
-        ))
+        .prepare(&format!("SELECT {names} FROM {} ORDER BY fid", layer.table))
         .map_err(unreadable)?;
     let mut found = select
         .query_map([], |row| {
@@ -263,15 +351,15 @@ fn read_back(path: &Path, features: &Features) -> Result<()> {
         })
         .map_err(unreadable)?;
     let mut rows = 0;
-    each(features, |expected| {
+    each(layer, |expected| {
         rows += 1;
         if found.next().transpose().map_err(unreadable)? != Some(expected) {
-            return differs(format!("row {rows} of {}", features.table));
+            return differs(format!("row {rows} of {}", layer.table));
         }
         Ok(())
     })?;
     if found.next().is_some() {
-        return differs(format!("more than {rows} {}", features.table));
+        return differs(format!("more than {rows} {}", layer.table));
     }
     Ok(())
 }
@@ -281,11 +369,8 @@ mod tests {
     use super::*;
     use crate::gis::tests::example;
 
-    fn for_gis() -> Features<'static> {
-        Features {
-            attributes: example().attributes.for_gis(),
-            ..example()
-        }
+    fn for_gis() -> Layer<'static> {
+        Layer::of_points(example())
     }
 
     #[test]

@@ -24,7 +24,7 @@ use self::{
 };
 use crate::{
     error::ProductError,
-    exchange::geopackage::GEOPACKAGE,
+    exchange::{contours, geopackage::GEOPACKAGE},
     files::{read_bytes, write_bytes},
     gis::crs_wkt,
     product::{Content, Context, Declaration, Program, Role, Use, Write},
@@ -34,8 +34,10 @@ use crate::{
 
 /// Name of the document inside the project.
 const DOCUMENT: &str = "site.qgs";
-/// The terrain model among the products.
-const TERRAIN: &str = "surface.tif";
+/// The terrain model among the products, and above the surface to which the heights of the report refer.
+const TERRAIN: &str = "surface_above_sphere.tif";
+const TERRAIN_ABOVE: [&str; 2] = ["surface_above_areoid.tif", "surface_above_ellipsoid.tif"];
+const CONTOURS: &str = "exchange/surface_contours.gpkg";
 /// Shares of the pixels of an orthoimage that are black and white on the map.
 const STRETCH: [f64; 2] = [0.02, 0.98];
 
@@ -182,6 +184,15 @@ fn layers(of: &Context) -> Result<Vec<Layer>> {
         is_shown: true,
         form: Form::Outlines { label: "image" },
     });
+    if is_written(of, CONTOURS) {
+        layers.push(Layer {
+            name: "Contours of the terrain model".to_owned(),
+            source: format!("{}|layername={}", source(CONTOURS), contours::LAYER),
+            wkt: geographic(),
+            is_shown: false,
+            form: Form::Contours { label: "height_m" },
+        });
+    }
     for orthoimage in site.find::<Vec<Orthoimage>>()?.into_iter().flatten() {
         let id = &site.images[orthoimage.account.image].times.id;
         let path = format!("images/{id}/orthoimage.tif");
@@ -199,16 +210,19 @@ fn layers(of: &Context) -> Result<Vec<Layer>> {
         });
     }
     if let Some(terrain) = site.find::<Surface>()?.filter(|_| is_written(of, TERRAIN)) {
-        let heights = terrain.model.heights.heights_m.iter();
-        let range = range(
-            heights
-                .filter(|height| height.is_finite())
-                .map(|height| f64::from(*height)),
-        );
-        let heights = source(TERRAIN);
+        let grid = &terrain.model.heights;
+        let other = TERRAIN_ABOVE.into_iter().find(|path| is_written(of, path));
+        let other = other.zip(terrain.account.reference.as_ref());
+        let (path, surface, heights_m) = match other {
+            Some((path, reference)) => (path, terms.areoid(), reference.heights_m(grid)),
+            None => (TERRAIN, "map sphere", grid.heights_m.clone()),
+        };
+        let known = heights_m.iter().filter(|height| height.is_finite());
+        let range = range(known.map(|height| f64::from(*height)));
+        let heights = source(path);
         let wkt = equirectangular_wkt(site.config.body, terrain.model.parallel_rad);
         layers.push(Layer {
-            name: "Terrain model, height in m".to_owned(),
+            name: format!("Terrain model, height above the {surface} in m"),
             source: heights.clone(),
             wkt: wkt.clone(),
             is_shown: true,

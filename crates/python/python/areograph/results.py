@@ -45,7 +45,10 @@ _REQUIRED = {
     "adjusted_isd.json": _ADJUSTMENT,
     "adjusted.tm": _ADJUSTMENT,
     "registered_footprints.parquet": "footprints inside its images",
-    "surface.tif": "a terrain model: two images with pixels, and cell_m in [surface] of the site file",
+    "surface_above_sphere.tif": "a terrain model: two images with pixels, and cell_m in [surface] of the site file",
+    "surface_above_areoid.tif": "a terrain model: two images with pixels, and cell_m in [surface] of the site file",
+    "surface_hillshade.tif": "a terrain model: two images with pixels, and cell_m in [surface] of the site file",
+    "surface_slope.tif": "a terrain model: two images with pixels, and cell_m in [surface] of the site file",
     "surface_sigma.tif": "a terrain model: two images with pixels, and cell_m in [surface] of the site file",
     "surface.json": "a terrain model: two images with pixels, and cell_m in [surface] of the site file",
     "overlay.png": "pixels of this image",
@@ -241,7 +244,7 @@ class Result:
         InputError
             If the site has no terrain model.
         """
-        return self.path("surface.tif")
+        return self.path("surface_above_sphere.tif")
 
     def orientation(self, image: str, *, adjusted: bool = False) -> DataFrame:
         """Positions and rotations of the camera, sampled along an image.

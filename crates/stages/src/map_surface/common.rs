@@ -60,7 +60,9 @@ pub(super) struct Common {
     pub(super) per_cell: usize,
     /// Edge of a pixel of each image on the ground, metres.
     pub(super) pixels_m: [f64; 2],
-    /// Angle between the rays of both images in the middle of the common ground.
+    /// Directions of the rays of both images in the middle of the common ground, and the angle between them.
+    pub(super) directions: [Vector3<f64>; 2],
+    /// See `directions`.
     pub(super) convergence_rad: f64,
     /// The lesser extent of the common ground, metres.
     width_m: f64,
@@ -80,7 +82,9 @@ impl Common {
         let Some(middle) = shown.get(shown.len() / 2) else {
             return Err(PairError::NothingInCommon { images: images() });
         };
-        let convergence_rad = convergence_rad(views, middle);
+        let directions = directions(views, middle);
+        let [one, other] = &directions;
+        let convergence_rad = one.cross(other).norm().atan2(one.dot(other));
         if !(convergence_rad >= CONVERGENCE_MIN_RAD) {
             return Err(PairError::Parallel {
                 images: images(),
@@ -118,6 +122,7 @@ impl Common {
             ground,
             per_cell: *per_cell,
             pixels_m,
+            directions,
             convergence_rad,
         })
     }
@@ -187,12 +192,11 @@ fn shown(views: [&View<'_>; 2], heights: &Heights) -> Vec<Prediction> {
     shown.collect()
 }
 
-/// Angle between the rays of both images at a place.
-fn convergence_rad(views: [&View<'_>; 2], at: &Prediction) -> f64 {
+/// Directions of the rays of both images at a place.
+fn directions(views: [&View<'_>; 2], at: &Prediction) -> [Vector3<f64>; 2] {
     let places = [&at.affine.from, &at.affine.to];
-    let [one, other] = [0, 1].map(|image: usize| {
+    [0, 1].map(|image: usize| {
         let place = places[image];
         views[image].camera.ray(place.x, place.y).direction()
-    });
-    one.cross(&other).norm().atan2(one.dot(&other))
+    })
 }

@@ -5,6 +5,7 @@ use crate::group_profiles::Profile;
 use areograph_base::{footprints::Footprints, frames::BodyFixed};
 use areograph_geom::{
     height_grid::HeightGrid,
+    reference_surface::ReferenceSurface,
     statistics::Summary,
     surface::{SurfaceOptions, attitude_sigma_m},
 };
@@ -12,11 +13,39 @@ use areograph_geom::{
 /// Slopes are differences over this distance to both sides, metres: about a footprint of the laser.
 const SLOPE_STEP_M: f64 = 100.0;
 
+impl ShotComparison {
+    /// Every shot of the profiles on a model against its height there.
+    pub(crate) fn of(
+        model: &SurfaceModel,
+        footprints: &Footprints<BodyFixed>,
+        profiles: &[Profile],
+        options: &SurfaceOptions,
+    ) -> Self {
+        compare(model, footprints, profiles, options)
+    }
+}
+
+impl SurfaceModel {
+    /// The areoid over the model, by the shots.
+    pub(crate) fn reference(&self, footprints: &Footprints<BodyFixed>) -> Option<ReferenceSurface> {
+        let shots = (0..footprints.len()).map(|at| {
+            let place_rad = [
+                footprints.longitude_rad.at(at),
+                footprints.latitude_rad.at(at),
+            ];
+            (place_rad, footprints.areoid_radius_m.at(at))
+        });
+        let [west, south, east, north] = self.heights.edges_rad();
+        let corners_rad = [[west, south], [east, south], [west, north], [east, north]];
+        ReferenceSurface::fitted(footprints.body, &corners_rad, shots)
+    }
+}
+
 /// Every shot of the profiles on a model against its height there.
 ///
 /// The statistics of all shots refer to profiles at nadir, whose heights do not depend on the attitude (decision 0028). Only
 /// where these have too few shots on the model do they refer to all profiles, each with the error due to its attitude.
-pub(super) fn compare(
+fn compare(
     model: &SurfaceModel,
     footprints: &Footprints<BodyFixed>,
     profiles: &[Profile],
@@ -181,6 +210,7 @@ mod tests {
             },
             parallel_rad: 0.2,
             sigmas_m: vec![2.0; size[0] * size[1]],
+            pairs: Vec::new(),
         }
     }
 

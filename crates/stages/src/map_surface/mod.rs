@@ -32,8 +32,7 @@ mod tests;
 use std::{collections::BTreeMap, sync::atomic::AtomicBool};
 
 use self::{
-    common::Common,
-    compare::compare,
+    common::{Common, PairError},
     jitter::{JitterAndSmoothing, Sizes},
     levels::all_levels,
 };
@@ -56,15 +55,15 @@ use areograph_store::{
 
 pub use lines::{LinesToMap, MapLines, map_lines};
 pub use result::{
-    ProfileOnSurface, SHOTS_MIN, ShotComparison, ShotOnSurface, Surface, SurfaceAccount,
-    SurfaceLook, SurfaceModel,
+    JoinedPair, Joint, ProfileOnSurface, SHOTS_MIN, Seam, ShotComparison, ShotOnSurface, Surface,
+    SurfaceAccount, SurfaceLook, SurfaceModel,
 };
 
 /// Smallest share of searched cells that must be found for the result to be significant: chance finds one in a few
 /// hundred.
 const FOUND_SHARE_MIN: f64 = 0.1;
 /// Cells along the longer side of the model on a page.
-const LOOK: usize = 480;
+pub(crate) const LOOK: usize = 480;
 
 stage_inputs! {
     /// Images with their best orientation and their pixels, known heights, and the configuration.
@@ -81,6 +80,8 @@ stage_inputs! {
         pub cell_m: &'a f64,
         /// Identifiers of the two images, where they are named.
         pub pair: &'a Option<[String; 2]>,
+        /// Whether it is one of all pairs of the site, so that it may have nothing in common.
+        pub is_of_all: &'a bool,
         /// Uncertainties of shots.
         pub laser_surface: &'a MolaSurfaceConfig,
         /// The adjustment that gave the images their orientation.
@@ -133,9 +134,14 @@ type Cell = Option<std::result::Result<Found, Unmatched>>;
 
 impl Stage for MapSurface<'_> {
     const NAME: &'static str = "map_surface";
-    const METHOD: u32 = 5;
+    const METHOD: u32 = 7;
     type Output = Surface;
     stage_inputs!(fingerprint);
+
+    fn part(&self) -> Option<String> {
+        let pair = self.pair.as_ref().filter(|_| *self.is_of_all);
+        pair.map(|pair| pair.join("/"))
+    }
 
     fn run(&self, stop: &AtomicBool) -> Result<Surface> {
         self.run_watched(stop.into())
@@ -167,15 +173,25 @@ impl Stage for MapSurface<'_> {
             cell_m: *self.cell_m,
             off_m: *self.off_m,
         };
-        let mut surface = map_surface([one, other], &heights, &options, watch)?;
+        let common = Common::of([one, other], options.body, &heights, options.cell_m);
+        let common = match common {
+            Err(PairError::NothingInCommon { .. } | PairError::Parallel { .. })
+                if *self.is_of_all =>
+            {
+                return Ok(Surface::withheld([*first, *second], *self.cell_m));
+            }
+            common => common?,
+        };
+        let mut surface = of_ground(&common, [one, other], &heights, &options, watch)?;
         let account = &mut surface.account;
         account.images = [*first, *second];
         let adjusted = self.adjusted.0.map(Output::value).transpose()?;
         let of_heights = adjusted.and_then(|adjusted| adjusted.heights.as_ref());
         account.common_sigma_m = of_heights.map(|of| of.mean_sigma_m[2]);
         account.shots_take_part = of_heights.is_some();
+        account.reference = surface.model.reference(footprints);
         let shots = self.laser_surface.options(footprints.body);
-        account.shots = compare(&surface.model, footprints, profiles, &shots);
+        account.shots = ShotComparison::of(&surface.model, footprints, profiles, &shots);
         Ok(surface)
     }
 }
@@ -218,8 +234,19 @@ fn map_surface(
     watch: Watch<'_>,
 ) -> Result<Surface> {
     let common = Common::of(views, options.body, heights, options.cell_m)?;
-    let cells = all_levels(&common, views, heights, options.off_m, watch)?;
-    Ok(surface_of(&common, &cells))
+    of_ground(&common, views, heights, options, watch)
+}
+
+/// The surface of a pair on its common ground.
+fn of_ground(
+    common: &Common,
+    views: [&View<'_>; 2],
+    heights: &Heights,
+    options: &Options,
+    watch: Watch<'_>,
+) -> Result<Surface> {
+    let cells = all_levels(common, views, heights, options.off_m, watch)?;
+    Ok(surface_of(common, &cells))
 }
 
 /// The model of all cells, and its statistics.
@@ -251,6 +278,7 @@ fn surface_of(common: &Common, cells: &[Cell]) -> Surface {
     let pixel_m = common.pixels_m[0].max(common.pixels_m[1]);
     let mut account = SurfaceAccount {
         images: [0, 1],
+        directions: common.directions.map(Into::into),
         cell_m: common.ground.cell_m,
         sample_m,
         compared_m,
@@ -267,8 +295,10 @@ fn surface_of(common: &Common, cells: &[Cell]) -> Surface {
         aside_m: median(|cell| cell.aside) * sample_m,
         common_sigma_m: None,
         shots_take_part: false,
+        reference: None,
         shots: ShotComparison::default(),
         look: SurfaceModel::nothing().look(1),
+        joint: None,
     };
     let found_share = f64::from(account.filled) / f64::from(account.searched().max(1));
     account.is_refused = !(account.filled > 0 && found_share >= FOUND_SHARE_MIN);
@@ -287,6 +317,7 @@ fn surface_of(common: &Common, cells: &[Cell]) -> Surface {
         sigmas_m: numbers(&|cell| errors.with(cell.sigma_m)),
         heights: common.ground.height_grid(numbers(&|cell| cell.height_m)),
         parallel_rad: common.ground.parallel_rad,
+        pairs: Vec::new(),
     };
     account.look = model.look(LOOK);
     Surface { account, model }

@@ -6,7 +6,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use areograph_base::ties::Unmatched;
-use areograph_geom::{height_grid::HeightGrid, statistics::Summary};
+use areograph_geom::{
+    height_grid::HeightGrid, reference_surface::ReferenceSurface, statistics::Summary,
+};
 
 /// A terrain model with its statistics.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -27,13 +29,17 @@ pub struct SurfaceModel {
     /// Standard deviation of every height about the common error, metres, NaN where there is no height: by the match, by
     /// jitter, and by the size of the compared square.
     pub sigmas_m: Vec<f32>,
+    /// Pairs that contribute to every height, by their bits ([`JoinedPair::bit`]); empty for the model of a single pair.
+    pub pairs: Vec<u32>,
 }
 
-/// Statistics of a terrain model.
+/// Statistics of a terrain model, for several pairs the sums and means over all of them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SurfaceAccount {
-    /// Indices of the images.
+    /// Indices of the images; of the first of several pairs.
     pub images: [usize; 2],
+    /// Directions of their rays in the middle, body-fixed, of unit length.
+    pub directions: [[f64; 3]; 2],
     /// Edge of a cell, and of the samples of the ground on which images were compared, metres.
     pub cell_m: f64,
     /// See `cell_m`.
@@ -66,10 +72,85 @@ pub struct SurfaceAccount {
     pub common_sigma_m: Option<f64>,
     /// Whether the shots controlled heights of the adjustment and are therefore not independent.
     pub shots_take_part: bool,
+    /// The areoid over it, or the ellipsoid where shots have no areoid; `None` without a shot.
+    pub reference: Option<ReferenceSurface>,
     /// The altimeter's shots on it.
     pub shots: ShotComparison,
     /// The model in larger cells, for display.
     pub look: SurfaceLook,
+    /// How the models of several pairs were joined; `None` for a single pair.
+    pub joint: Option<Joint>,
+}
+
+/// Terrain models of several pairs as one.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Joint {
+    /// The pairs.
+    pub pairs: Vec<JoinedPair>,
+    /// Their overlaps.
+    pub seams: Vec<Seam>,
+    /// Number of cells with a height.
+    pub filled: u32,
+    /// Number of these with heights of several pairs.
+    pub several: u32,
+}
+
+/// A pair of a joined model.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct JoinedPair {
+    /// Indices of the images.
+    pub images: [usize; 2],
+    /// Its bit among the pairs of a cell; `None` for a pair without a model.
+    pub bit: Option<u32>,
+    /// Cells that both images show, and number of these with a height.
+    pub cells: u32,
+    /// See `cells`.
+    pub filled: u32,
+    /// Angle between the rays of both images, radians.
+    pub convergence_rad: f64,
+    /// Root mean square of the standard deviations of its heights about their common error, metres.
+    pub sigma_m: f64,
+    /// Its level above that of all pairs, which was subtracted, and its standard deviation, metres.
+    pub offset_m: f64,
+    /// See `offset_m`.
+    pub offset_sigma_m: f64,
+    /// Median of the altimeter above it before the subtraction, and its standard deviation, metres; `None` with too few
+    /// shots.
+    pub shots_above_m: Option<[f64; 2]>,
+}
+
+/// The overlap of two pairs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Seam {
+    /// Indices of the pairs.
+    pub pairs: [usize; 2],
+    /// Number of cells with heights of both.
+    pub cells: u32,
+    /// The first above the second before and after the adjustment of offsets, metres.
+    pub before_m: f64,
+    /// See `before_m`.
+    pub after_m: f64,
+    /// Standard deviation of this difference, by its scatter along the overlap, metres.
+    pub sigma_m: f64,
+    /// Robust spread of the differences of cells about their mean, in their standard deviations.
+    pub spread_sigmas: f64,
+}
+
+impl JoinedPair {
+    /// The statistics of its model, before it is joined.
+    pub(crate) const fn of(account: &SurfaceAccount) -> Self {
+        Self {
+            images: account.images,
+            bit: None,
+            cells: account.cells,
+            filled: account.filled,
+            convergence_rad: account.convergence_rad,
+            sigma_m: account.sigma_m,
+            offset_m: 0.0,
+            offset_sigma_m: 0.0,
+            shots_above_m: None,
+        }
+    }
 }
 
 /// Fewer shots do not validate a terrain model.
@@ -130,6 +211,36 @@ pub struct SurfaceLook {
 }
 
 impl Surface {
+    /// That of a pair without common ground, or without convergence.
+    pub(crate) fn withheld(images: [usize; 2], cell_m: f64) -> Self {
+        let model = SurfaceModel::nothing();
+        let account = SurfaceAccount {
+            images,
+            directions: [[0.0; 3]; 2],
+            cell_m,
+            sample_m: 0.0,
+            compared_m: 0.0,
+            cells: 0,
+            filled: 0,
+            unfilled: BTreeMap::new(),
+            is_refused: true,
+            convergence_rad: 0.0,
+            height_of_pixel_m: 0.0,
+            sigma_m: 0.0,
+            jitter_m: 0.0,
+            smoothing_m: 0.0,
+            correlation: 0.0,
+            aside_m: 0.0,
+            common_sigma_m: None,
+            shots_take_part: false,
+            reference: None,
+            shots: ShotComparison::default(),
+            look: model.look(1),
+            joint: None,
+        };
+        Self { account, model }
+    }
+
     /// Its statistics, which a page shows.
     #[must_use]
     pub fn without_model(&self) -> Self {
@@ -154,6 +265,7 @@ impl SurfaceModel {
             },
             parallel_rad: 0.0,
             sigmas_m: Vec::new(),
+            pairs: Vec::new(),
         }
     }
 
@@ -205,6 +317,16 @@ impl SurfaceModel {
 }
 
 impl SurfaceAccount {
+    /// A grid of the model with its heights above the areoid, or the ellipsoid; above the sphere where neither is known.
+    #[must_use]
+    pub fn above_reference(&self, grid: &HeightGrid) -> HeightGrid {
+        let heights_m = self.reference.as_ref().map(|of| of.heights_m(grid));
+        HeightGrid {
+            heights_m: heights_m.unwrap_or_else(|| grid.heights_m.clone()),
+            ..grid.clone()
+        }
+    }
+
     /// Cells with texture that were searched in both images.
     #[must_use]
     pub fn searched(&self) -> u32 {

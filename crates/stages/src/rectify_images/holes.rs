@@ -8,9 +8,10 @@ use areograph_geom::height_grid::HeightGrid;
 /// Maximum distance of interpolation from known cells, cells: holes up to twice as wide are filled, and wider ones stay empty.
 const REACH: usize = 8;
 
-/// A terrain model with heights in its narrow holes. Their standard deviations contain the change of known heights over the
+/// A terrain model with heights in its narrow holes, up to 16 cells wide. Their standard deviations contain the change of known heights over the
 /// distance to the nearest of them.
-pub(super) fn bridged(model: &SurfaceModel) -> SurfaceModel {
+#[must_use]
+pub fn bridged(model: &SurfaceModel) -> SurfaceModel {
     let grid = &model.heights;
     let is_known: Vec<bool> = grid.heights_m.iter().map(|of| !of.is_nan()).collect();
     let distances = closed(&is_known, grid.size);
@@ -37,6 +38,7 @@ pub(super) fn bridged(model: &SurfaceModel) -> SurfaceModel {
         },
         sigmas_m: numbers(&|at, distance| sigmas_m[at].hypot(change_m(distance))),
         parallel_rad: model.parallel_rad,
+        pairs: Vec::new(),
     }
 }
 
@@ -145,6 +147,7 @@ mod tests {
                 heights_m,
             },
             parallel_rad: 0.2,
+            pairs: Vec::new(),
         };
         let made = bridged(&model);
         let at = |row: usize, column: usize| {

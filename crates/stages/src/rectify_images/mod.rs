@@ -37,7 +37,7 @@ use areograph_store::{
 
 use cells::Cells;
 use drift::drift_m;
-use holes::bridged;
+pub use holes::bridged;
 use sight_lines::SightLines;
 
 /// Maximum number of cells of an orthoimage: 1.3 bytes each in its file.

@@ -51,6 +51,7 @@ fn model(ground_m: impl Fn(&Vector3<f64>) -> f64) -> SurfaceModel {
         sigmas_m: vec![1.0; size[0] * size[1]],
         heights,
         parallel_rad: 0.0,
+        pairs: Vec::new(),
     }
 }
 

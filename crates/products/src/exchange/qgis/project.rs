@@ -17,6 +17,8 @@ const COLOURS: [&str; 5] = [
 ];
 /// Beginning of the identifiers of layers; QGIS replaces those of up to ten letters.
 const ID: &str = "areograph_layer_";
+/// Colour of contours.
+const BROWN: &str = "140,81,10,255";
 /// Blend mode "multiply" of QGIS.
 const MULTIPLY: &str = "6";
 const NORMAL: &str = "0";
@@ -46,6 +48,8 @@ pub(super) enum Form {
     Arrows { magnification: f64 },
     /// Polygons without a filling, labelled by a column.
     Outlines { label: &'static str },
+    /// Lines, labelled by a column.
+    Contours { label: &'static str },
     /// Brightness in this range.
     Brightness { range: [u8; 2] },
     /// Heights in colours, multiplied with the layer below.
@@ -59,6 +63,7 @@ impl Form {
     const fn geometry(&self) -> Option<&'static str> {
         match self {
             Self::Points | Self::Heights { .. } | Self::Arrows { .. } => Some("Point"),
+            Self::Contours { .. } => Some("Line"),
             Self::Outlines { .. } => Some("Polygon"),
             Self::Brightness { .. } | Self::Terrain { .. } | Self::Shaded => None,
         }
@@ -131,7 +136,7 @@ fn layer_element(id: &str, layer: &Layer) -> Markup {
     } else {
         NORMAL
     };
-    let labels = if matches!(form, Form::Outlines { .. }) {
+    let labels = if matches!(form, Form::Outlines { .. } | Form::Contours { .. }) {
         "1"
     } else {
         "0"
@@ -145,7 +150,7 @@ fn layer_element(id: &str, layer: &Layer) -> Markup {
             provider encoding="UTF-8" { (form.provider()) }
             @if is_vector {
                 (vector_style(form))
-                layerGeometryType { (if form.geometry() == Some("Point") { "0" } else { "2" }) }
+                layerGeometryType { (match form.geometry() { Some("Point") => "0", Some("Line") => "1", _ => "2" }) }
             } @else {
                 pipe { (raster_style(form)) }
             }
@@ -200,21 +205,37 @@ fn vector_style(form: &Form) -> Markup {
                 ("outline_width", "0.5"),
                 ("outline_width_unit", "MM"),
             ]);
-            html! { (single(&symbol("0", "fill", "SimpleFill", &line))) (labels(label)) }
+            html! {
+                (single(&symbol("0", "fill", "SimpleFill", &line)))
+                (labels(label, "227,26,28,255", ["1", "PolygonGeometry"]))
+            }
+        }
+        Form::Contours { label } => {
+            let line = options(&[
+                ("line_color", BROWN),
+                ("line_style", "solid"),
+                ("line_width", "0.2"),
+                ("line_width_unit", "MM"),
+            ]);
+            html! {
+                (single(&symbol("0", "line", "SimpleLine", &line)))
+                (labels(label, BROWN, ["2", "LineGeometry"]))
+            }
         }
         _ => single(&dot("0", "120,120,120,255")),
     }
 }
 
-fn labels(column: &str) -> Markup {
+/// Labels at a placement of QGIS for a kind of geometry.
+fn labels(column: &str, colour: &str, [placement, geometry]: [&str; 2]) -> Markup {
     html! {
         labeling type="simple" {
             settings calloutType="simple" {
-                text-style fieldName=(column) isExpression="0" fontSize="9" fontSizeUnit="Point" textColor="227,26,28,255"
+                text-style fieldName=(column) isExpression="0" fontSize="9" fontSizeUnit="Point" textColor=(colour)
                     textOpacity="1" {
                     text-buffer bufferDraw="1" bufferSize="0.8" bufferSizeUnits="MM" bufferColor="255,255,255,255" bufferOpacity="1" {}
                 }
-                placement placement="1" quadOffset="4" priority="5" polygonPlacementFlags="2" layerType="PolygonGeometry" {}
+                placement placement=(placement) quadOffset="4" priority="5" polygonPlacementFlags="2" layerType=(geometry) {}
                 rendering drawLabels="1" obstacle="1" fontMaxPixelSize="10000" maxNumLabels="2000" {}
             }
         }

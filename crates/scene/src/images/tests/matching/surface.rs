@@ -25,7 +25,7 @@ impl Published {
         };
         let document = fs::read(products.join("surface.json")).unwrap();
         Self {
-            heights: read("surface.tif"),
+            heights: read("surface_above_sphere.tif"),
             sigmas_m: read("surface_sigma.tif").heights_m,
             document: serde_json::from_slice(&document).unwrap(),
         }
