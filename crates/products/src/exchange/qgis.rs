@@ -182,7 +182,7 @@ fn layers(of: &Context) -> Result<Vec<Layer>> {
         is_shown: true,
         form: Form::Outlines { label: "image" },
     });
-    for orthoimage in site.find::<Vec<Orthoimage>>()?.into_iter().flatten() {
+    for orthoimage in Orthoimage::best(site.book)? {
         let id = &site.images[orthoimage.account.image].times.id;
         let path = format!("images/{id}/orthoimage.tif");
         if !is_written(of, &path) {

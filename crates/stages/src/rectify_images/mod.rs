@@ -31,7 +31,8 @@ use areograph_base::{
 };
 use areograph_geom::{height_grid::HeightGrid, pushbroom::Unseen};
 use areograph_store::{
-    stage::{Output, Stage},
+    book::Book,
+    stage::{Output, Round, Stage},
     stage_inputs,
 };
 
@@ -41,12 +42,12 @@ use holes::bridged;
 use sight_lines::SightLines;
 
 /// Maximum number of cells of an orthoimage: 1.3 bytes each in its file.
-const CELLS_MAX: usize = 1 << 27;
+pub(crate) const CELLS_MAX: usize = 1 << 27;
 /// Cells along the longer side of an orthoimage on a page.
 const LOOK: usize = 1_000;
 
 stage_inputs! {
-    /// Images with their best orientation and their pixels, and the terrain model.
+    /// Images with their orientation and their pixels, and the terrain model.
     pub struct RectifyImages<'a> {
         /// The images.
         pub images: SiteImages<'a>,
@@ -54,8 +55,10 @@ stage_inputs! {
         pub pixels: PixelFiles<'a>,
         /// The terrain model.
         pub surface: &'a Output<Surface>,
-        /// The adjustment that gave the images their orientation.
+        /// The adjustment of the images, where there is one: images without tie points are left out.
         pub adjusted: AdjustmentOfImages<'a>,
+        /// The orientation of the images: from the kernels, or adjusted.
+        pub round: Round,
         /// Edge of a cell, metres.
         pub cell_m: &'a f64,
     }
@@ -74,6 +77,28 @@ pub struct Orthoimage {
 }
 
 impl Orthoimage {
+    /// The orthoimages of a site with its best orientation; empty if it requests none.
+    ///
+    /// # Errors
+    /// An output that is not known or cannot be read.
+    pub fn best(book: &Book) -> Result<&[Self]> {
+        let adjusted = book.find::<Vec<Self>>(Round::Adjusted)?;
+        let found = adjusted.map_or_else(|| book.find(Round::Initial), |of| Ok(Some(of)))?;
+        Ok(found.map_or(&[], Vec::as_slice))
+    }
+
+    /// Those with the orientation from the kernels, in a site whose best orientation is the adjusted one; empty if it requests
+    /// none.
+    ///
+    /// # Errors
+    /// As [`Self::best`].
+    pub fn before(book: &Book) -> Result<&[Self]> {
+        let found = book
+            .has::<Vec<Self>>(Round::Adjusted)
+            .then(|| book.find::<Vec<Self>>(Round::Initial));
+        Ok(found.transpose()?.flatten().map_or(&[], Vec::as_slice))
+    }
+
     /// Its statistics, which a page shows.
     #[must_use]
     pub fn without_cells(&self) -> Self {
@@ -161,6 +186,10 @@ impl Stage for RectifyImages<'_> {
     type Output = Vec<Orthoimage>;
     stage_inputs!(fingerprint);
 
+    fn part(&self) -> Option<String> {
+        self.round.part()
+    }
+
     fn run(&self, stop: &AtomicBool) -> Result<Vec<Orthoimage>> {
         self.run_watched(stop.into())
     }
@@ -171,7 +200,9 @@ impl Stage for RectifyImages<'_> {
         if surface.account.is_refused {
             return Ok(made);
         }
-        let adjusted = self.adjusted.0.map(Output::value).transpose()?;
+        let tied = self.adjusted.0.map(Output::value).transpose()?;
+        // It states nothing of orientations from kernels.
+        let adjusted = tied.filter(|_| self.round != Round::Initial);
         let oriented = self.images.oriented()?;
         let times = self.images.0.iter().map(|image| image.times.value());
         let times: Vec<&ImageTimes> = times.collect::<Result<_>>()?;
@@ -186,7 +217,7 @@ impl Stage for RectifyImages<'_> {
                 unseen,
             })?;
             // Its own error is not the shared error of the adjusted images.
-            if adjusted.is_some_and(|adjusted| !adjusted.is_tied(index)) {
+            if tied.is_some_and(|tied| !tied.is_tied(index)) {
                 continue;
             }
             let adjustment = adjusted.and_then(|adjusted| AdjustedView::of(adjusted, index));
@@ -299,7 +330,7 @@ fn rectified(
 
 impl OrthoimageLook {
     /// In cells so large that no side has more than [`LOOK`] of them.
-    fn of([rows, columns]: [usize; 2], pixels: &[u8]) -> Self {
+    pub(crate) fn of([rows, columns]: [usize; 2], pixels: &[u8]) -> Self {
         let step = rows.max(columns).div_ceil(LOOK).max(1);
         let size = [rows.div_ceil(step), columns.div_ceil(step)];
         let mut sums = vec![[0_u32; 2]; size[0] * size[1]];

@@ -10,6 +10,7 @@ pub mod line_camera;
 pub mod mola_surface;
 pub mod orientation;
 pub mod oriented;
+pub(crate) mod raster;
 pub(crate) mod shot_heights;
 pub mod site_image;
 pub(crate) mod turn;
