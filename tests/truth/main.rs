@@ -5,6 +5,7 @@ mod clean_missions;
 mod common;
 mod matched_ties;
 mod mutations;
+mod orthoimages;
 mod scene_errors;
 mod scene_mission;
 mod scene_ties;

@@ -52,6 +52,7 @@ mod picture;
 mod product;
 mod profile_check;
 mod ranges;
+mod raster_label;
 pub mod read;
 mod registered_footprints;
 mod registration;
@@ -82,7 +83,7 @@ pub use exchange::{
 pub use files::{read_bytes, write_bytes, write_json};
 pub use found_shots::{ShotBatches, ShotsFile};
 pub use generated::{documentation, schemas};
-pub use geotiff::{GeoTiff, Label, Number};
+pub use geotiff::{GeoTiff, Number};
 pub use laser_match::{MatchProducts, write_match_products};
 pub use listed::listed;
 pub use net::{NetProducts, write_net_products};
@@ -94,6 +95,7 @@ pub use picture::{PictureFile, PictureFormat, PictureHead};
 pub use product::{
     Content, Context, Declaration, Pages, Product, Program as ReadingProgram, Role, Use, Write,
 };
+pub use raster_label::Label;
 pub use registry::declarations;
 pub use rows_file::{Out, RowsFormat, RowsWriter, SQL};
 #[cfg(feature = "sql")]

@@ -41,9 +41,9 @@ pub mod tag_times;
 pub mod tag_utc;
 pub mod triangulate;
 
-#[cfg(test)]
-use shared::invented_pair;
 pub use shared::{
     camera_lines, image_pixels, line_camera, mola_surface, orientation, oriented, site_image,
 };
 use shared::{ground, image_view, raster, shot_heights, turn};
+#[cfg(test)]
+use shared::{invented_orthoimage, invented_pair};

@@ -3,9 +3,9 @@
 use maud::{Markup, html};
 
 use super::{
+    grey::{grey, stretched},
     mosaic,
     products::{self, Offsets, Pair, offsets},
-    section::{grey, stretched},
 };
 use crate::{
     error::Result,

@@ -2,6 +2,7 @@
 //! (`stages/mosaic_images`): files, section of the page.
 
 mod comparison;
+mod grey;
 mod mosaic;
 mod products;
 mod section;

@@ -1,15 +1,10 @@
 //! Orthoimages: their cells, the uncertainty of positions in them, and pictures.
 
-#![allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "brightnesses and cells are small numbers, and casts of floats saturate"
-)]
-
 use maud::{Markup, html};
 
 use super::{
     comparison,
+    grey::{grey, stretched},
     products::{has_orthoimages, orthoimages},
 };
 use crate::{
@@ -21,9 +16,6 @@ use crate::{
     },
     stages::rectify_images::{Orthoimage, OrthoimageAccount},
 };
-
-/// Share of the darkest and of the brightest cells that are shown as black and as white.
-const CLIPPED: f64 = 0.005;
 
 pub(super) const SECTION: Section = Section {
     title: "Orthoimages",
@@ -122,27 +114,4 @@ fn picture(site: &SiteProducts, of: &OrthoimageAccount) -> Result<Markup> {
         link(&path, name)
     });
     Ok(html! { div { (picture) p { (id) ": " (image) ", " (sigma) } } })
-}
-
-/// The brightness that is shown as black, and as white.
-pub(super) fn stretched(brightness: &[u8]) -> [u8; 2] {
-    let mut known: Vec<u8> = brightness.iter().copied().filter(|of| *of > 0).collect();
-    known.sort_unstable();
-    let at = |share: f64| {
-        let place = (share * known.len() as f64) as usize;
-        known.get(place.min(known.len().saturating_sub(1))).copied()
-    };
-    [CLIPPED, 1.0 - CLIPPED].map(|share| at(share).unwrap_or(1))
-}
-
-/// Pixels of four bytes, the last of them the opacity.
-pub(super) fn grey(brightness: &[u8], ends: [u8; 2]) -> Vec<u8> {
-    let [dark, bright] = ends.map(f64::from);
-    let pixel = |brightness: &u8| {
-        let share = (f64::from(*brightness) - dark) / (bright - dark).max(1.0);
-        let grey = (255.0 * share).round() as u8;
-        let opacity = if *brightness > 0 { u8::MAX } else { 0 };
-        [grey, grey, grey, opacity]
-    };
-    brightness.iter().flat_map(pixel).collect()
 }

@@ -48,6 +48,10 @@ const PLACES: usize = 2_000;
 const CORRELATION_MIN: f64 = 0.7;
 /// Least difference of the correlation from that of another peak.
 const DISTINCT: f64 = 0.1;
+/// Share of the squares that match by chance: no more of them are trusted.
+const CHANCE: f64 = 0.25;
+/// Largest distance of an offset from the median of all: robust standard deviations, and cells in addition.
+const SCATTER_MAX: [f64; 2] = [6.0, 2.0];
 /// Largest distance of the final position from the best whole cell, along an axis.
 const MOVED_MAX: f64 = 1.5;
 
@@ -93,7 +97,12 @@ impl OrthoimageOffsets {
     /// Root mean square offset, both axes together, metres; `None` without a place.
     #[must_use]
     pub fn rms_m(&self) -> Option<f64> {
-        rms_m(&self.places)
+        let squares_m2 = self.places.iter().map(|of| {
+            let [east_m, north_m] = of.offset_m;
+            east_m * east_m + north_m * north_m
+        });
+        let count = self.places.len() as f64;
+        (!self.places.is_empty()).then(|| (squares_m2.sum::<f64>() / count).sqrt())
     }
 
     /// Statistics of the offsets, east and north, metres.
@@ -101,15 +110,6 @@ impl OrthoimageOffsets {
     pub fn summaries_m(&self) -> [Summary; 2] {
         [0, 1].map(|axis| Summary::over(|| self.places.iter().map(move |of| of.offset_m[axis])))
     }
-}
-
-/// Root mean square offset of places, both axes together, metres; `None` without a place.
-pub(crate) fn rms_m(places: &[PlaceOffset]) -> Option<f64> {
-    let squares_m2 = places
-        .iter()
-        .map(|of| of.offset_m[0].hypot(of.offset_m[1]).powi(2));
-    let count = places.len() as f64;
-    (!places.is_empty()).then(|| (squares_m2.sum::<f64>() / count).sqrt())
 }
 
 impl Stage for CompareOrthoimages<'_> {
@@ -139,8 +139,7 @@ impl Stage for CompareOrthoimages<'_> {
 }
 
 /// Offsets of the second orthoimage against the first; `None` where they have no square in common.
-#[must_use]
-pub fn offsets(first: &Orthoimage, second: &Orthoimage) -> Option<OrthoimageOffsets> {
+fn offsets(first: &Orthoimage, second: &Orthoimage) -> Option<OrthoimageOffsets> {
     let [one, other] = [first, second].map(|of| Raster::of(&of.account.map, &of.brightness));
     let shift = shift(&one, &other, first.account.cell_m)?;
     let middles = middles(&one);
@@ -149,12 +148,33 @@ pub fn offsets(first: &Orthoimage, second: &Orthoimage) -> Option<OrthoimageOffs
         .map(|middle| found(&one, &other, &first.account, *middle, &shift))
         .collect();
     let squares = found.iter().flatten().count();
-    (squares > 0).then(|| OrthoimageOffsets {
+    let mut offsets = OrthoimageOffsets {
         images: [first, second].map(|of| of.account.image),
         cell_m: first.account.cell_m,
         squares: u32::try_from(squares).unwrap_or(u32::MAX),
         places: found.into_iter().flatten().flatten().collect(),
-    })
+    };
+    offsets.leave_out_mismatches();
+    (squares > 0).then_some(offsets)
+}
+
+impl OrthoimageOffsets {
+    /// Leaves out places whose offsets contradict the others, and all of them where so few match that chance may explain them.
+    fn leave_out_mismatches(&mut self) {
+        let summaries_m = self.summaries_m();
+        let [sigmas, cells] = SCATTER_MAX;
+        let cells_m = cells * self.cell_m;
+        self.places.retain(|of| {
+            let axes = summaries_m.iter().zip(of.offset_m);
+            let mut near = axes.map(|(all, offset_m)| {
+                (offset_m - all.median).abs() <= sigmas * all.nmad + cells_m
+            });
+            near.all(|is_near| is_near)
+        });
+        if (self.places.len() as f64) < CHANCE * f64::from(self.squares) {
+            self.places.clear();
+        }
+    }
 }
 
 /// Cells in the middle of squares. The grid is that of all orthoimages of about this size, so that places before and after the
@@ -229,3 +249,6 @@ fn found(
         correlation: matched.correlation,
     }))
 }
+
+#[cfg(test)]
+mod tests;

@@ -18,10 +18,10 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    compare_orthoimages::{CompareOrthoimages, EDGE, OrthoimageOffsets, PlaceOffset, rms_m},
+    compare_orthoimages::{EDGE, OrthoimageOffsets, PlaceOffset},
     map_surface::Surface,
     raster::{Raster, first_cell},
-    rectify_images::{CELLS_MAX, Orthoimage, OrthoimageLook, RectifyImages},
+    rectify_images::{CELLS_MAX, Orthoimage, OrthoimageLook},
     site_image::SiteImages,
 };
 use areograph_base::{
@@ -35,7 +35,7 @@ use areograph_geom::{
     statistics::median,
 };
 use areograph_store::{
-    stage::{Called, Output, Round, Stage, called},
+    stage::{Output, Round, Stage},
     stage_inputs,
 };
 
@@ -160,10 +160,6 @@ impl Mosaic {
 
 impl Stage for MosaicImages<'_> {
     const NAME: &'static str = "mosaic_images";
-    const CALLS: &'static [Called] = &[
-        called::<RectifyImages<'_>>(),
-        called::<CompareOrthoimages<'_>>(),
-    ];
     type Output = Option<Mosaic>;
     stage_inputs!(fingerprint);
 
@@ -379,11 +375,14 @@ fn seam(
         }
         found == [true; 2]
     };
-    let crossed: Vec<PlaceOffset> = pair.places.iter().filter(is_crossed).copied().collect();
+    let crossed = OrthoimageOffsets {
+        places: pair.places.iter().filter(is_crossed).copied().collect(),
+        ..*pair
+    };
     Some(SeamOffsets {
         images: pair.images,
-        places: u32::try_from(crossed.len()).unwrap_or(u32::MAX),
-        rms_m: rms_m(&crossed)?,
+        places: u32::try_from(crossed.places.len()).unwrap_or(u32::MAX),
+        rms_m: crossed.rms_m()?,
     })
 }
 

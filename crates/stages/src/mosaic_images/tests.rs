@@ -7,10 +7,8 @@
 )]
 
 use super::*;
-use crate::rectify_images::OrthoimageAccount;
+use crate::invented_orthoimage::{CELL_M, RADIUS_M, orthoimage};
 
-const RADIUS_M: f64 = 3_396_190.0;
-const CELL_M: f64 = 5.0;
 /// Number of columns of an orthoimage, and of those between the first columns of two.
 const COLUMNS: usize = 120;
 const APART: i64 = 60;
@@ -19,49 +17,6 @@ const APART: i64 = 60;
 fn ground([row, column]: [i64; 2]) -> f64 {
     let [row, column] = [row as f64, column as f64];
     100.0 + 35.0 * (0.31 * row + 0.5 * (0.17 * column).sin()).sin() + 25.0 * (0.23 * column).cos()
-}
-
-/// An orthoimage with these first cell and size, by the brightness of its cells.
-fn orthoimage(
-    image: usize,
-    first: [i64; 2],
-    size: [usize; 2],
-    brightness: impl Fn([i64; 2]) -> f64,
-) -> Orthoimage {
-    let cell_rad = CELL_M / RADIUS_M;
-    let map = HeightGrid {
-        size,
-        first_rad: [first[1] as f64 + 0.5, -(first[0] as f64 + 0.5)].map(|at| at * cell_rad),
-        cell_rad: [cell_rad; 2],
-        radius_m: RADIUS_M,
-        heights_m: Vec::new(),
-    };
-    let cells =
-        (0..size[0] as i64).flat_map(|row| (0..size[1] as i64).map(move |column| [row, column]));
-    let brightness =
-        cells.map(|cell| brightness([0, 1].map(|axis| first[axis] + cell[axis])) as u8);
-    let brightness: Vec<u8> = brightness.collect();
-    Orthoimage {
-        account: OrthoimageAccount {
-            image,
-            look: OrthoimageLook::of(size, &brightness),
-            map,
-            parallel_rad: 0.0,
-            cell_m: CELL_M,
-            pixel_m: CELL_M,
-            filled: 0,
-            without_pixels: 0,
-            terrain_cells: 0,
-            interpolated: 0,
-            hidden: 0,
-            sigma_m: 1.0,
-            jitter_m: None,
-            drift_m: None,
-            shared_sigma_m: None,
-        },
-        brightness,
-        sigmas_m: Vec::new(),
-    }
 }
 
 /// Two strips side by side: the second with another tone, both with a hole in the middle of the overlap.

@@ -9,7 +9,6 @@
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::*;
-use crate::compare_orthoimages::offsets;
 use crate::invented_pair::{Invented, LINES, RADIUS_M};
 use areograph_geom::{
     ellipsoid::spherical_to_xyz_m,
@@ -185,8 +184,8 @@ fn orthoimages_show_the_ground_where_it_is() {
 fn orthoimages_of_a_pair_agree_as_far_as_their_orientations_do() {
     let model = model(hill_m);
     let one = orthoimage(0, [0.0; 2], hill_m, &model);
-    let [same, moved] = [[0.0; 2], [24.0, -16.0]].map(|off_m| orthoimage(1, off_m, hill_m, &model));
-    let [agreeing, apart] = [&same, &moved].map(|other| shifts(&one, other));
+    let agreeing = shifts(&one, &orthoimage(1, [0.0; 2], hill_m, &model));
+    let apart = shifts(&one, &orthoimage(1, [24.0, -16.0], hill_m, &model));
     println!(
         "{} places: {:.3}; {:.3}",
         agreeing.len(),
@@ -199,25 +198,6 @@ fn orthoimages_of_a_pair_agree_as_far_as_their_orientations_do() {
     // 24 m north and 16 m west, in cells.
     let expected = f64::hypot(6.0, 4.0);
     assert!((rms(&apart) - expected).abs() < 0.3);
-    // The stage measures the same, in metres towards east and north.
-    for (other, expected_m) in [(&same, [0.0; 2]), (&moved, [-16.0, 24.0])] {
-        let found = offsets(&one, other).unwrap();
-        let medians_m = found.summaries_m().map(|of| of.median);
-        let rms_m = found.rms_m().unwrap();
-        println!(
-            "{} of {} places: {medians_m:?} m, rms {rms_m:.2} m",
-            found.places.len(),
-            found.squares
-        );
-        assert!(found.places.len() >= 20 && found.places.len() * 10 >= found.squares as usize * 9);
-        for axis in 0..2 {
-            // A quarter of a cell.
-            assert!((medians_m[axis] - expected_m[axis]).abs() < 0.25 * CELL_M);
-        }
-        let apart_m = expected_m[0].hypot(expected_m[1]);
-        // Two parts of the mean square: the shift, and at most 0.3 cells about it.
-        assert!((apart_m..=apart_m.hypot(0.3 * CELL_M) + 0.25 * CELL_M).contains(&rms_m));
-    }
 }
 
 #[test]

@@ -5,6 +5,8 @@ pub(crate) mod ground;
 pub mod image_pixels;
 pub(crate) mod image_view;
 #[cfg(test)]
+pub(crate) mod invented_orthoimage;
+#[cfg(test)]
 pub(crate) mod invented_pair;
 pub mod line_camera;
 pub mod mola_surface;
