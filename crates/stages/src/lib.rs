@@ -42,7 +42,7 @@ pub mod tag_utc;
 pub mod triangulate;
 
 pub use shared::{
-    camera_lines, image_pixels, line_camera, mola_surface, orientation, oriented, site_image,
+    camera_lines, image_pixels, line_camera, look, mola_surface, orientation, oriented, site_image,
 };
 use shared::{ground, image_view, raster, shot_heights, turn};
 #[cfg(test)]

@@ -15,16 +15,21 @@ use crate::{
         parts::{Cell, Column, Table, label, link, picture_of, signed, whole},
     },
     stage::Round,
-    stages::mosaic_images::{Mosaic, MosaicAccount, MosaicDetail},
+    stages::mosaic_images::{MosaicAccount, MosaicDetail},
     units::METRES_PER_KM,
 };
 
 /// Indices of colours of offsets before and after.
 const BEFORE: usize = 1;
 const AFTER: usize = 0;
-/// Rows at the upper and lower edge of a detail on which the images are marked, and the two colours of the marks.
+/// Rows at the upper and lower edge of a detail on which the images are marked, and the colours of the marks.
 const MARKED: usize = 8;
-const MARKS: [[u8; 3]; 2] = [[230, 159, 0], [86, 180, 233]];
+const MARKS: [(&str, [u8; 3]); 4] = [
+    ("orange", [230, 159, 0]),
+    ("blue", [86, 180, 233]),
+    ("green", [0, 158, 115]),
+    ("purple", [204, 121, 167]),
+];
 
 /// Offsets of every pair: a sentence, a table and a map; empty without overlapping orthoimages.
 pub(super) fn compared(site: &SiteProducts) -> Result<Markup> {
@@ -164,29 +169,32 @@ pub(super) fn mosaic(site: &SiteProducts) -> Result<Markup> {
         return Ok(Markup::default());
     };
     let before = mosaic::before(site)?;
-    let states: Vec<(&str, &str, &Mosaic)> = match before {
-        Some(before) => vec![
-            ("before the adjustment", "mosaic_before", before),
-            ("after the adjustment", "mosaic", best),
-        ],
-        None => vec![("", "mosaic", best)],
+    let after = if before.is_some() {
+        " after the adjustment"
+    } else {
+        ""
     };
-    let seams = states
-        .iter()
-        .flat_map(|(state, _, of)| seams(site, state, &of.account));
-    let seams: Vec<String> = seams.collect();
+    let before = before.map(|of| (" before the adjustment", "mosaic_before", &of.account));
+    let states = before.into_iter().chain([(after, "mosaic", &best.account)]);
+    let states: Vec<(&str, &str, &MosaicAccount)> = states.collect();
+    let look = &best.account.look;
+    let whole = picture_of(
+        &grey(&look.brightness, stretched(&look.brightness)),
+        look.size,
+        "Mosaic, north up",
+    )?;
     Ok(html! {
         h3 { "Mosaic" }
         p {
-            "Each cell is taken from one image; mosaic_source.tif identifies it. Seams follow the ground on which overlapping \
-             images differ least. "
+            "Each cell is taken from one image. Seams follow the ground on which overlapping images differ least. "
             @if site.config.surface.mosaic_balance {
                 "A gain and an offset for each image balance the tones. "
             }
-            @for seam in &seams { (seam) " " }
+            @for (state, _, of) in &states { @for seam in seams(site, state, of) { (seam) " " } }
         }
         div.pieces {
-            @for (state, name, of) in &states { (pictures(site, state, name, &of.account)?) }
+            @for (state, name, of) in &states { (detail(site, state, name, of)?) }
+            div { (whole) p { "Mosaic" (after) ", north up" } }
         }
     })
 }
@@ -195,7 +203,6 @@ pub(super) fn mosaic(site: &SiteProducts) -> Result<Markup> {
 fn seams(site: &SiteProducts, state: &str, account: &MosaicAccount) -> Vec<String> {
     let seams = account.seams.iter().map(|seam| {
         let [one, other] = seam.images.map(|image| &site.images[image].times.id);
-        let state = if state.is_empty() { String::new() } else { format!(" {state}") };
         format!(
             "At the seam of {one} and {other}, the images differ by {} m{state} (root mean square, {} places).",
             label(seam.rms_m, 1),
@@ -205,46 +212,32 @@ fn seams(site: &SiteProducts, state: &str, account: &MosaicAccount) -> Vec<Strin
     seams.collect()
 }
 
-/// The complete mosaic and the detail at a seam.
-fn pictures(
-    site: &SiteProducts,
-    state: &str,
-    name: &str,
-    account: &MosaicAccount,
-) -> Result<Markup> {
-    let state = if state.is_empty() {
-        String::new()
-    } else {
-        format!(" {state}")
-    };
+/// A detail at a seam, with links to the files of the mosaic.
+fn detail(site: &SiteProducts, state: &str, name: &str, account: &MosaicAccount) -> Result<Markup> {
     let [image, sources] = ["", "_source"].map(|end| {
         let file = format!("{name}{end}.tif");
         link(&format!("../{file}"), &file)
     });
-    let whole = picture_of(
-        &grey(
-            &account.look.brightness,
-            stretched(&account.look.brightness),
-        ),
-        account.look.size,
-        &format!("Mosaic{state}, north up"),
-    )?;
-    let detail = account.detail.as_ref().map(|of| {
-        let width_km = of.size[1] as f64 * account.cell_m / METRES_PER_KM;
-        let alt = format!("Seam of the mosaic{state}, north up");
-        let ids: Vec<&str> = numbers(of).map(|at| &*site.images[account.images[at].image].times.id).collect();
-        let picture = picture_of(&marked(of), of.size, &alt)?;
-        let words = format!(
-            "Detail at a seam{state}, {} km wide, no tone balance beyond that of the mosaic; coloured edges: {}.",
-            label(width_km, 1),
-            ids.join(" and ")
-        );
-        Ok(html! { div { (picture) p { (words) } } })
+    let files = html! { "Mosaic" (state) ": " (image) "; image of each cell: " (sources) "." };
+    let Some(of) = &account.detail else {
+        return Ok(html! { div { p { (files) " It has no seam." } } });
+    };
+    let width_km = of.size[1] as f64 * account.cell_m / METRES_PER_KM;
+    let alt = format!("Mosaic{state}, detail at a seam, north up");
+    let picture = picture_of(&marked(of), of.size, &alt)?;
+    let edges = numbers(of).map(|at| {
+        let id = &site.images[account.images[at].image].times.id;
+        format!("{}: {id}", MARKS[at % MARKS.len()].0)
     });
-    let detail: Option<Result<Markup>> = detail;
+    let edges: Vec<String> = edges.collect();
     Ok(html! {
-        div { (whole) p { "Mosaic" (state) ": " (image) ", " (sources) } }
-        (detail.transpose()?.unwrap_or_default())
+        div {
+            (picture)
+            p {
+                (files) " The detail is " (label(width_km, 1)) " km wide; colours at its upper and lower edge identify the image ("
+                (edges.join(", ")) ")."
+            }
+        }
     })
 }
 
@@ -264,7 +257,7 @@ fn marked(detail: &MosaicDetail) -> Vec<u8> {
         let row = at / columns.max(1);
         let source = detail.sources[at];
         if source > 0 && (row < MARKED || row + MARKED >= rows) {
-            let colour = MARKS[usize::from(source - 1) % MARKS.len()];
+            let (_, colour) = MARKS[usize::from(source - 1) % MARKS.len()];
             pixel[..3].copy_from_slice(&colour);
         }
     }

@@ -12,6 +12,11 @@
 //! # Source
 //! Lewis 1995, *Fast normalized cross-correlation*; Förstner 1982 and Gruen 1985 for least-squares matching.
 
+#![allow(
+    clippy::cast_possible_wrap,
+    reason = "numbers of cells of a map are far below 2⁶³"
+)]
+
 mod shift;
 
 use std::sync::atomic::AtomicBool;

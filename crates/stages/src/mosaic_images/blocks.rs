@@ -1,5 +1,10 @@
 //! Blocks of cells of a mosaic: what overlapping orthoimages show in them.
 
+#![allow(
+    clippy::cast_possible_wrap,
+    reason = "numbers of cells of a map are far below 2⁶³"
+)]
+
 use rayon::prelude::*;
 
 use super::{

@@ -7,6 +7,11 @@
 //! Besides the mosaic, two bytes for each cell, memory is bounded by the number of blocks; tones and seams are found in one
 //! pass over strips of blocks, and the mosaic is written in a second.
 
+#![allow(
+    clippy::cast_possible_wrap,
+    reason = "numbers of cells of a map are far below 2⁶³"
+)]
+
 mod balance;
 mod blocks;
 mod seams;
@@ -19,9 +24,10 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     compare_orthoimages::{EDGE, OrthoimageOffsets, PlaceOffset},
+    look::OrthoimageLook,
     map_surface::Surface,
     raster::{Raster, first_cell},
-    rectify_images::{CELLS_MAX, Orthoimage, OrthoimageLook},
+    rectify_images::{CELLS_MAX, Orthoimage},
     site_image::SiteImages,
 };
 use areograph_base::{
@@ -228,12 +234,15 @@ fn mosaic(
     let labels = survey.blocks.labels();
     let tables: Vec<[u8; 256]> = survey.tones.iter().map(Tone::table).collect();
     let cells = composed(&map, orthoimages, (&labels, survey.edge), &tables, watch)?;
-    let parts = orthoimages.iter().zip(&survey.tones).zip(1_u8..);
-    let parts = parts.map(|((of, tone), number)| MosaicPart {
+    let mut counts = [0_u32; 256];
+    for source in &cells.sources {
+        counts[usize::from(*source)] += 1;
+    }
+    let parts = orthoimages.iter().zip(&survey.tones).zip(&counts[1..]);
+    let parts = parts.map(|((of, tone), cells)| MosaicPart {
         image: of.account.image,
         tone: [tone.gain, tone.offset],
-        cells: u32::try_from(cells.sources.iter().filter(|of| **of == number).count())
-            .unwrap_or(u32::MAX),
+        cells: *cells,
     });
     let parts: Vec<MosaicPart> = parts.collect();
     let sources = Raster::of(&map, &cells.sources);

@@ -2,11 +2,15 @@
 
 #![allow(
     clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
     clippy::cast_sign_loss,
-    reason = "brightness of a byte"
+    reason = "cells of a small grid, and the brightness of a byte"
 )]
 
-use crate::rectify_images::{Orthoimage, OrthoimageAccount, OrthoimageLook};
+use crate::{
+    look::OrthoimageLook,
+    rectify_images::{Orthoimage, OrthoimageAccount},
+};
 use areograph_geom::height_grid::HeightGrid;
 
 pub(crate) const RADIUS_M: f64 = 3_396_190.0;

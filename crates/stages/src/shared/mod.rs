@@ -9,6 +9,7 @@ pub(crate) mod invented_orthoimage;
 #[cfg(test)]
 pub(crate) mod invented_pair;
 pub mod line_camera;
+pub mod look;
 pub mod mola_surface;
 pub mod orientation;
 pub mod oriented;

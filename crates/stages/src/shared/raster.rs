@@ -1,5 +1,10 @@
 //! Brightness of orthoimages on one grid of cells, whose rows and columns count from 0° E 0° N.
 
+#![allow(
+    clippy::cast_possible_wrap,
+    reason = "numbers of cells of a map are far below 2⁶³"
+)]
+
 use areograph_geom::{height_grid::HeightGrid, imaging::Patch};
 
 /// Brightness on cells; 0 where there is none.
@@ -123,7 +128,7 @@ impl Reduced {
         let offset = [0, 1].map(|axis| self.first[axis] + by[axis] - other.first[axis]);
         let columns = other.size[1] as i64;
         let mut sums = [0.0_f64; 5];
-        let mut count = 0;
+        let mut count = 0_usize;
         for (row, values) in self.values.chunks_exact(self.size[1]).enumerate() {
             let there = usize::try_from(row as i64 + offset[0]).ok();
             let Some(there) = there.filter(|there| *there < other.size[0]) else {
@@ -147,9 +152,9 @@ impl Reduced {
                 }
             }
         }
-        let [a, b, aa, bb, ab] = sums.map(|sum| sum / f64::from(count.max(1)));
+        let [a, b, aa, bb, ab] = sums.map(|sum| sum / count.max(1) as f64);
         let spread = ((aa - a * a) * (bb - b * b)).max(f64::MIN_POSITIVE).sqrt();
-        (count as usize, (ab - a * b) / spread)
+        (count, (ab - a * b) / spread)
     }
 }
 
