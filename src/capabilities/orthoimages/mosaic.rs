@@ -193,7 +193,7 @@ struct Document<'a> {
     images: Vec<Part<'a>>,
     /// Seams between two images; without those that no matching square crosses.
     seams: Vec<Seam<'a>>,
-    /// Seams of the mosaic with the orientation from the kernels, mosaic_before.tif; omitted if it was not requested.
+    /// Seams of the mosaic with the orientation from the kernels, `mosaic_before.tif`; omitted if it was not requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     seams_before: Option<Vec<Seam<'a>>>,
 }
@@ -201,7 +201,7 @@ struct Document<'a> {
 /// An image of a mosaic.
 #[derive(Serialize, JsonSchema)]
 struct Part<'a> {
-    /// Number in mosaic_source.tif.
+    /// Number in `mosaic_source.tif`.
     #[schemars(range(min = 1))]
     number: usize,
     /// Identifier of the image.

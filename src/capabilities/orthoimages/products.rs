@@ -179,7 +179,7 @@ struct Document<'a> {
     site: &'a str,
     #[schemars(length(min = 1))]
     orthoimages: Vec<Entry<'a>>,
-    /// Offsets of every two overlapping orthoimages; orthoimage_offsets.csv lists their places.
+    /// Offsets of every two overlapping orthoimages; `orthoimage_offsets.csv` lists their places.
     pairs: Vec<Pair<'a>>,
 }
 
