@@ -1,10 +1,12 @@
 //! Orthoimages of a pair before and after the adjustment of a known misregistration, and their mosaics.
 
 #![allow(
+    clippy::cast_possible_wrap,
     clippy::disallowed_methods,
-    clippy::unwrap_used,
     clippy::panic,
-    reason = "tests work in temporary folders and may fail loudly"
+    clippy::print_stdout,
+    clippy::unwrap_used,
+    reason = "tests work in temporary folders with small maps, and may fail loudly"
 )]
 
 use std::{fs, fs::File, path::Path};
