@@ -121,6 +121,7 @@ mod tests {
         config.ties.matched = true;
         config.surface.cell_m = Some(1.0);
         config.surface.orthoimage_cell_m = Some(1.0);
+        config.surface.mosaic = true;
         let mut outline = Outline::default();
         site(&mut outline, &config).unwrap();
         let mut first = outline.names();

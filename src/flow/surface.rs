@@ -1,4 +1,4 @@
-//! The part of the flow that makes a terrain model, and orthoimages on it.
+//! The part of the flow that makes a terrain model, orthoimages on it, and their mosaic.
 
 use super::{
     driver::{Driver, Flow},
@@ -8,14 +8,18 @@ use super::{
 use crate::stages::site_image::SiteImages;
 use crate::{
     config::SiteConfig,
-    stage::{InOrder, Round, Stage as _},
+    error::Result,
+    stage::{InOrder, Output, Round, Stage as _},
     stages::{
         adjust::Adjusted,
+        compare_orthoimages::{CompareOrthoimages, OrthoimageOffsets},
         image_pixels::PixelFiles,
         join_surfaces::JoinSurfaces,
         map_surface::{AdjustmentOfImages, MapSurface, Surface},
+        mosaic_images::{Mosaic, MosaicImages},
         rectify_images::{Orthoimage, RectifyImages},
     },
+    store::book::Book,
 };
 
 /// The terrain model of all pairs of images with their best orientation, and orthoimages; not for a site that requests none, or whose
@@ -62,16 +66,32 @@ pub(super) fn surface<D: Driver>(flow: &mut D, config: &SiteConfig, site: &mut S
             })?
         }
     };
+    let before = adjusted.is_some() && config.surface.orthoimages_before;
+    let before = before.then(|| site.images()).transpose()?;
+    let before = before.as_ref().map(|of| (Round::Initial, SiteImages(of)));
+    let best = adjusted.map_or(Round::Initial, |_| Round::Adjusted);
+    let mut made = Vec::new();
     if let Some(cell_m) = &config.surface.orthoimage_cell_m {
-        let orthoimages = flow.stage(&RectifyImages {
-            images,
-            pixels: PixelFiles(&pixels),
-            surface: &surface,
-            adjusted: AdjustmentOfImages(adjusted),
-            cell_m,
-        })?;
-        let shown = |of: &Vec<Orthoimage>| of.iter().map(Orthoimage::without_cells).collect();
-        site.book.enter_heavy(Round::Initial, orthoimages, shown)?;
+        for (round, images) in before.into_iter().chain([(best, images)]) {
+            let orthoimages = flow.stage(&RectifyImages {
+                images,
+                pixels: PixelFiles(&pixels),
+                surface: &surface,
+                adjusted: AdjustmentOfImages(adjusted),
+                round,
+                cell_m,
+            })?;
+            made.push(of_orthoimages(
+                flow,
+                config,
+                (round, images),
+                &surface,
+                orthoimages,
+            )?);
+        }
+    }
+    for of in made {
+        of.enter(&mut site.book)?;
     }
     let shown = Surface::without_model;
     Ok(site.book.enter_heavy(Round::Initial, surface, shown)?)
@@ -92,4 +112,57 @@ fn pairs(config: &SiteConfig) -> Vec<Option<[String; 2]>> {
             .collect::<Vec<_>>()
     };
     ids.iter().enumerate().flat_map(of_first).collect()
+}
+
+/// Orthoimages of one orientation, and what is made of them.
+struct Made {
+    round: Round,
+    orthoimages: Output<Vec<Orthoimage>>,
+    offsets: Output<Vec<OrthoimageOffsets>>,
+    mosaic: Option<Output<Option<Mosaic>>>,
+}
+
+/// The offsets of orthoimages, and their mosaic if it is requested.
+fn of_orthoimages<D: Driver>(
+    flow: &mut D,
+    config: &SiteConfig,
+    (round, images): (Round, SiteImages<'_>),
+    surface: &Output<Surface>,
+    orthoimages: Output<Vec<Orthoimage>>,
+) -> Flow<Made> {
+    let offsets = flow.stage(&CompareOrthoimages {
+        round,
+        orthoimages: &orthoimages,
+    })?;
+    let mosaic = if config.surface.mosaic {
+        Some(flow.stage(&MosaicImages {
+            round,
+            images,
+            surface,
+            orthoimages: &orthoimages,
+            offsets: &offsets,
+            balance: &config.surface.mosaic_balance,
+        })?)
+    } else {
+        None
+    };
+    Ok(Made {
+        round,
+        orthoimages,
+        offsets,
+        mosaic,
+    })
+}
+
+impl Made {
+    fn enter(self, book: &mut Book) -> Result<()> {
+        let shown = |of: &Vec<Orthoimage>| of.iter().map(Orthoimage::without_cells).collect();
+        book.enter_heavy(self.round, self.orthoimages, shown)?;
+        book.enter(self.round, self.offsets)?;
+        if let Some(mosaic) = self.mosaic {
+            let shown = |of: &Option<Mosaic>| of.as_ref().map(Mosaic::without_cells);
+            book.enter_heavy(self.round, mosaic, shown)?;
+        }
+        Ok(())
+    }
 }

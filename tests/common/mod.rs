@@ -21,6 +21,7 @@ pub(crate) mod daf;
 pub(crate) mod flows;
 pub(crate) mod mission;
 pub(crate) mod page;
+pub(crate) mod pair;
 pub(crate) mod products_site;
 pub(crate) mod readers;
 pub(crate) mod search;

@@ -6,6 +6,7 @@ mod common;
 mod joined_terrain;
 mod matched_ties;
 mod mutations;
+mod orthoimages;
 mod scene_errors;
 mod scene_mission;
 mod scene_ties;

@@ -20,6 +20,13 @@ declare_table! {
         /// Edge of a cell of orthoimages on this terrain model, usually the ground size of an image pixel. Orthoimages
         /// are computed from every image with `pixels` and tie points; without this key, none is computed.
         orthoimage_cell_m: Option<f64> = key(above_to(0.0, 1e5)).unused("5.0"),
+        /// Whether orthoimages, and their mosaic, are also computed with the orientation from the kernels, for comparison with
+        /// the adjusted ones: `orthoimage_before.tif`. Without an adjustment, this key has no effect.
+        orthoimages_before: bool = key(Switch).or(false).unused("true"),
+        /// Whether orthoimages are joined in one map, `mosaic.tif`, with seams where overlapping images differ least.
+        mosaic: bool = key(Switch).or(false).unused("true"),
+        /// Whether a gain and an offset for each orthoimage balance the tones of the mosaic.
+        mosaic_balance: bool = key(Switch).or(true).unused("false"),
         /// Identifiers of the two images if a single pair is used although more than two images of the site have `pixels`.
         images: Option<[String; 2]> = key(several(identifier(), "identifiers of two images")).unused(r#"["m0402852", "m0403104"]"#),
         /// Whether to write another terrain model, `surface_filled_*.tif`, with interpolated heights in holes of up to 16
@@ -29,16 +36,32 @@ declare_table! {
     check a_cell_is_given
 }
 
-/// A requested terrain model has a cell size, and orthoimages have a terrain model.
+/// Keys that need orthoimages.
+const OF_ORTHOIMAGES: [&str; 3] = ["orthoimages_before", "mosaic", "mosaic_balance"];
+
+/// A requested terrain model has a cell size, orthoimages have a terrain model, and a mosaic has orthoimages.
 fn a_cell_is_given(surface: &SurfaceConfig, keys: &mut Keys<'_, '_>) {
-    keys.rule(
-        || json!({"dependentRequired": {"images": ["cell_m"], "orthoimage_cell_m": ["cell_m"]}}),
-    );
+    keys.rule(|| {
+        json!({"dependentRequired": {
+            "images": ["cell_m"],
+            "orthoimage_cell_m": ["cell_m"],
+            "orthoimages_before": ["orthoimage_cell_m"],
+            "mosaic": ["orthoimage_cell_m"],
+            "mosaic_balance": ["orthoimage_cell_m"],
+        }})
+    });
     let needs_model = surface.images.is_some() || surface.orthoimage_cell_m.is_some();
     if needs_model && keys.span_of("cell_m").is_none() {
         keys.missing(
             "cell_m",
             "the edge of a cell in metres (or no table [surface] at all)",
+        );
+    }
+    let needs_orthoimages = OF_ORTHOIMAGES.iter().any(|key| keys.span_of(key).is_some());
+    if needs_orthoimages && keys.span_of("orthoimage_cell_m").is_none() {
+        keys.missing(
+            "orthoimage_cell_m",
+            "the edge of a cell of orthoimages in metres",
         );
     }
 }

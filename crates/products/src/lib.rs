@@ -41,6 +41,7 @@ mod light_time;
 mod listed;
 mod net;
 mod orientation;
+mod orthoimage_offsets;
 mod overlays;
 mod page;
 mod page_data;
@@ -51,6 +52,7 @@ mod picture;
 mod product;
 mod profile_check;
 mod ranges;
+mod raster_label;
 pub mod read;
 mod registered_footprints;
 mod registration;
@@ -85,6 +87,7 @@ pub use geotiff::{GeoTiff, Number};
 pub use laser_match::{MatchProducts, write_match_products};
 pub use listed::listed;
 pub use net::{NetProducts, write_net_products};
+pub use orthoimage_offsets::ORTHOIMAGE_OFFSETS;
 pub use overlays::{Picture, anaglyph, piece, strip};
 pub use page::REPORT;
 pub use page_data::{PAGE_DATA, PageData};
@@ -92,6 +95,7 @@ pub use picture::{PictureFile, PictureFormat, PictureHead};
 pub use product::{
     Content, Context, Declaration, Pages, Product, Program as ReadingProgram, Role, Use, Write,
 };
+pub use raster_label::Label;
 pub use registry::declarations;
 pub use rows_file::{Out, RowsFormat, RowsWriter, SQL};
 #[cfg(feature = "sql")]

@@ -41,6 +41,7 @@ mod moved;
 mod net;
 mod notes;
 mod numbers;
+mod offset_arrows;
 mod outcome;
 mod outlines;
 mod overlays;
@@ -80,6 +81,7 @@ pub use fidelity::{
 pub use html::STYLE;
 pub use laser_match::match_page;
 pub use net::net_page;
+pub use offset_arrows::{Offsets, offset_arrows};
 pub use overlays::overlays_page;
 pub use readings::{ReadPair, Readings, readings_page};
 pub use section::Section;

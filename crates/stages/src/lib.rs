@@ -14,6 +14,7 @@ pub mod check_heights;
 pub mod check_profiles;
 pub mod check_ranges;
 pub mod compare_kernels;
+pub mod compare_orthoimages;
 pub mod compare_pairs;
 pub mod convert_datum;
 pub mod describe_kernels;
@@ -26,6 +27,7 @@ pub mod lay_overlays;
 pub mod map_surface;
 pub mod match_laser;
 pub mod match_ties;
+pub mod mosaic_images;
 pub mod outline_windows;
 pub mod read_shots;
 pub mod read_ties;
@@ -40,9 +42,9 @@ pub mod tag_times;
 pub mod tag_utc;
 pub mod triangulate;
 
-#[cfg(test)]
-use shared::invented_pair;
 pub use shared::{
-    camera_lines, image_pixels, line_camera, mola_surface, orientation, oriented, site_image,
+    camera_lines, image_pixels, line_camera, look, mola_surface, orientation, oriented, site_image,
 };
-use shared::{ground, image_view, shot_heights, turn};
+use shared::{ground, image_view, raster, shot_heights, turn};
+#[cfg(test)]
+use shared::{invented_orthoimage, invented_pair};

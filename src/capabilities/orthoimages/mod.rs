@@ -1,15 +1,27 @@
-//! Orthoimages (`stages/rectify_images`): files, section of the page.
+//! Orthoimages (`stages/rectify_images`), offsets between them (`stages/compare_orthoimages`) and their mosaic
+//! (`stages/mosaic_images`): files, section of the page.
 
+mod comparison;
+mod grey;
+mod mosaic;
 mod products;
 mod section;
 
 use super::Capability;
+use crate::products::ORTHOIMAGE_OFFSETS;
 
 pub(super) static CAPABILITY: Capability = Capability {
     products: &[
         &products::ORTHOIMAGE,
+        &products::BEFORE,
         &products::SIGMAS,
         &products::DOCUMENT,
+        &ORTHOIMAGE_OFFSETS,
+        &mosaic::MOSAIC,
+        &mosaic::SOURCES,
+        &mosaic::BEFORE,
+        &mosaic::SOURCES_BEFORE,
+        &mosaic::DOCUMENT,
     ],
     section: section::SECTION,
     judge: None,

@@ -8,9 +8,15 @@ use serde::Serialize;
 use crate::{
     capabilities::terrain::{Band, write_map, write_raster},
     error::Result,
-    products::{Content, Context, Declaration, GeoTiff, Role, SiteProducts, Write, write_json},
+    geom::height_grid::HeightGrid,
+    products::{
+        Content, Context, Declaration, GeoTiff, Number, Role, SiteProducts, Write, write_json,
+    },
     schema::DocumentSchema,
-    stages::{map_surface::Surface, rectify_images::Orthoimage},
+    stage::Round,
+    stages::{
+        compare_orthoimages::OrthoimageOffsets, map_surface::Surface, rectify_images::Orthoimage,
+    },
 };
 
 /// Images and sites with these products.
@@ -30,6 +36,25 @@ pub(super) static ORTHOIMAGE: Declaration = Declaration {
         has: has_orthoimage,
         write: |path, of, image| {
             let made = orthoimage(of.site, image)?;
+            made.map_or(Ok(0), |image| write_brightness(path, of, image))
+        },
+    },
+    uses: &[],
+};
+
+pub(super) static BEFORE: Declaration = Declaration {
+    path: "images/<image>/orthoimage_before.tif",
+    what: "as orthoimage.tif, with the orientation before the adjustment, for comparison; its positions have the errors of the \
+           kernels",
+    readers: "GIS",
+    rows: "cells with a brightness",
+    role: Role::Data,
+    content: Content::Foreign,
+    write: Write::ImageWhere {
+        images: "every image with an orthoimage, with `surface.orthoimages_before`",
+        has: |site, image| !matches!(orthoimage_before(site, image), Ok(None)),
+        write: |path, of, image| {
+            let made = orthoimage_before(of.site, image)?;
             made.map_or(Ok(0), |image| write_brightness(path, of, image))
         },
     },
@@ -65,7 +90,7 @@ pub(super) static SIGMAS: Declaration = Declaration {
 
 pub(super) static DOCUMENT: Declaration = Declaration {
     path: "orthoimages.json",
-    what: "cells of every orthoimage, and the uncertainty of positions in each",
+    what: "cells of every orthoimage, the uncertainty of positions in each, and measured offsets between them",
     readers: "scripts",
     rows: "orthoimages",
     role: Role::Metadata,
@@ -75,7 +100,7 @@ pub(super) static DOCUMENT: Declaration = Declaration {
         has: has_orthoimages,
         write: |path, of| {
             let orthoimages = orthoimages(of.site)?;
-            write_json(path, &Document::of(of.site, orthoimages))?;
+            write_json(path, &Document::of(of.site, orthoimages)?)?;
             Ok(orthoimages.len() as u64)
         },
     },
@@ -84,12 +109,16 @@ pub(super) static DOCUMENT: Declaration = Declaration {
 
 /// The orthoimages of a site; empty if it requests none.
 pub(super) fn orthoimages<'a>(site: &SiteProducts<'a>) -> Result<&'a [Orthoimage]> {
-    let found = site.find::<Vec<Orthoimage>>()?;
-    Ok(found.map_or(&[], Vec::as_slice))
+    Orthoimage::best(site.book)
 }
 
 fn orthoimage<'a>(site: &SiteProducts<'a>, image: usize) -> Result<Option<&'a Orthoimage>> {
     let mut all = orthoimages(site)?.iter();
+    Ok(all.find(|of| of.account.image == image))
+}
+
+fn orthoimage_before<'a>(site: &SiteProducts<'a>, image: usize) -> Result<Option<&'a Orthoimage>> {
+    let mut all = Orthoimage::before(site.book)?.iter();
     Ok(all.find(|of| of.account.image == image))
 }
 
@@ -102,16 +131,35 @@ fn has_orthoimage(site: &SiteProducts, image: usize) -> bool {
     !matches!(orthoimage(site, image), Ok(None))
 }
 
-/// Writes the brightness of all cells, and reads it back.
+/// Writes the brightness of all cells.
 fn write_brightness(path: &Path, of: &Context, image: &Orthoimage) -> Result<u64> {
+    let account = &image.account;
+    let what = "brightness of an image";
+    let numbers = &*image.brightness;
+    write_cells(
+        path,
+        of,
+        (&account.map, account.parallel_rad),
+        (what, numbers),
+    )?;
+    Ok(u64::from(account.filled))
+}
+
+/// Writes the numbers of all cells of a map, and reads them back.
+pub(super) fn write_cells<N: Number + Send + Sync>(
+    path: &Path,
+    of: &Context,
+    (grid, parallel_rad): (&HeightGrid, f64),
+    (what, numbers): (&str, &[N]),
+) -> Result<u64> {
     let file = GeoTiff {
-        grid: &image.account.map,
-        parallel_rad: image.account.parallel_rad,
+        grid,
+        parallel_rad,
         body: of.site.config.body,
-        what: "brightness of an image",
+        what,
         unit: "",
         vertical: "",
-        numbers: &image.brightness,
+        numbers,
     };
     write_raster(path, &file)
 }
@@ -121,7 +169,7 @@ fn write_brightness(path: &Path, of: &Context, image: &Orthoimage) -> Result<u64
 #[schemars(
     deny_unknown_fields,
     title = "orthoimages.json",
-    description = "orthoimages.json of areograph: cells of every orthoimage of a site, and the uncertainty of positions in each. Metres; unknown values are omitted."
+    description = "orthoimages.json of areograph: cells of every orthoimage of a site, the uncertainty of positions in each, and measured offsets between them. Metres; unknown values are omitted."
 )]
 struct Document<'a> {
     #[schemars(extend("const" = "areograph orthoimages 1"))]
@@ -129,6 +177,85 @@ struct Document<'a> {
     site: &'a str,
     #[schemars(length(min = 1))]
     orthoimages: Vec<Entry<'a>>,
+    /// Offsets of every two overlapping orthoimages; `orthoimage_offsets.csv` lists their places.
+    pairs: Vec<Pair<'a>>,
+}
+
+/// Two overlapping orthoimages.
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Pair<'a> {
+    /// Identifiers of the images.
+    pub(super) images: [&'a str; 2],
+    /// With the orientation from the kernels; omitted if it was not computed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) before: Option<Offsets>,
+    /// With the adjusted orientation; omitted without an adjustment.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) after: Option<Offsets>,
+}
+
+/// Offsets of the second orthoimage against the first.
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Offsets {
+    /// Number of compared squares.
+    pub(super) squares: u32,
+    /// Number of squares that match.
+    pub(super) places: u32,
+    /// Root mean square offset, both axes together; omitted if no square matches.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) rms_m: Option<f64>,
+    /// The same in cells.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) rms_cells: Option<f64>,
+    /// Median, east and north.
+    pub(super) median_m: [f64; 2],
+    /// Robust standard deviation (1.4826 times the median absolute deviation), east and north.
+    #[schemars(inner(range(min = 0.0)))]
+    pub(super) sigma_m: [f64; 2],
+}
+
+impl Offsets {
+    fn of(pair: &OrthoimageOffsets) -> Self {
+        let summaries_m = pair.summaries_m();
+        let rms_m = pair.rms_m();
+        Self {
+            squares: pair.squares,
+            places: summaries_m[0].n,
+            rms_m,
+            rms_cells: rms_m.map(|rms_m| rms_m / pair.cell_m),
+            median_m: summaries_m.map(|of| of.median),
+            sigma_m: summaries_m.map(|of| of.nmad),
+        }
+    }
+}
+
+/// Offsets with the orientation of this round; empty if the site has none.
+pub(super) fn offsets<'a>(
+    site: &SiteProducts<'a>,
+    round: Round,
+) -> Result<&'a [OrthoimageOffsets]> {
+    let found = site.book.find::<Vec<OrthoimageOffsets>>(round)?;
+    Ok(found.map_or(&[], Vec::as_slice))
+}
+
+/// All pairs of overlapping orthoimages.
+pub(super) fn pairs<'a>(site: &SiteProducts<'a>) -> Result<Vec<Pair<'a>>> {
+    let rounds = [Round::Initial, Round::Adjusted].map(|round| offsets(site, round));
+    let [before, after] = rounds;
+    let [before, after] = [before?, after?];
+    let mut images: Vec<[usize; 2]> = before.iter().chain(after).map(|of| of.images).collect();
+    images.sort_unstable();
+    images.dedup();
+    let pairs = images.into_iter().map(|images| {
+        let of =
+            |all: &[OrthoimageOffsets]| all.iter().find(|of| of.images == images).map(Offsets::of);
+        Pair {
+            images: images.map(|image| &*site.images[image].times.id),
+            before: of(before),
+            after: of(after),
+        }
+    });
+    Ok(pairs.collect())
 }
 
 /// An orthoimage.
@@ -171,7 +298,7 @@ struct Entry<'a> {
 }
 
 impl<'a> Document<'a> {
-    fn of(site: &SiteProducts<'a>, orthoimages: &'a [Orthoimage]) -> Self {
+    fn of(site: &SiteProducts<'a>, orthoimages: &'a [Orthoimage]) -> Result<Self> {
         let orthoimages = orthoimages.iter().map(|of| {
             let of = &of.account;
             let [rows, columns] = of.map.size;
@@ -192,10 +319,11 @@ impl<'a> Document<'a> {
                 shared_sigma_m: of.shared_sigma_m,
             }
         });
-        Self {
+        Ok(Self {
             format: "areograph orthoimages 1",
             site: &site.config.site,
             orthoimages: orthoimages.collect(),
-        }
+            pairs: pairs(site)?,
+        })
     }
 }

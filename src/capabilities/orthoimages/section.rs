@@ -1,14 +1,12 @@
 //! Orthoimages: their cells, the uncertainty of positions in them, and pictures.
 
-#![allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "brightnesses and cells are small numbers, and casts of floats saturate"
-)]
-
 use maud::{Markup, html};
 
-use super::products::{has_orthoimages, orthoimages};
+use super::{
+    comparison,
+    grey::{grey, stretched},
+    products::{has_orthoimages, orthoimages},
+};
 use crate::{
     error::Result,
     products::SiteProducts,
@@ -16,11 +14,8 @@ use crate::{
         Section,
         parts::{Cell, Column, Table, label, link, picture_of, whole},
     },
-    stages::rectify_images::{Orthoimage, OrthoimageAccount, OrthoimageLook},
+    stages::rectify_images::{Orthoimage, OrthoimageAccount},
 };
-
-/// Share of the darkest and of the brightest cells that are shown as black and as white.
-const CLIPPED: f64 = 0.005;
 
 pub(super) const SECTION: Section = Section {
     title: "Orthoimages",
@@ -42,7 +37,9 @@ fn write(site: &SiteProducts) -> Result<Markup> {
              along the image). The adjustment states the σ of the shared error on each axis. Images without tie points are \
              not rectified in an adjusted site."
         }
+        (comparison::compared(site)?)
         div.pieces { @for of in orthoimages { (picture(site, &of.account)?) } }
+        (comparison::mosaic(site)?)
     })
 }
 
@@ -107,33 +104,14 @@ fn table(site: &SiteProducts, orthoimages: &[Orthoimage]) -> Markup {
 fn picture(site: &SiteProducts, of: &OrthoimageAccount) -> Result<Markup> {
     let id = &site.images[of.image].times.id;
     let alt = format!("Orthoimage of {id}, north up");
-    let picture = picture_of(&grey(&of.look), of.look.size, &alt)?;
+    let picture = picture_of(
+        &grey(&of.look.brightness, stretched(&of.look.brightness)),
+        of.look.size,
+        &alt,
+    )?;
     let [image, sigma] = ["orthoimage.tif", "orthoimage_sigma.tif"].map(|name| {
         let path = format!("../images/{id}/{name}");
         link(&path, name)
     });
     Ok(html! { div { (picture) p { (id) ": " (image) ", " (sigma) } } })
-}
-
-/// Pixels of four bytes, the last of them the opacity, stretched between the darkest and the brightest cells.
-fn grey(look: &OrthoimageLook) -> Vec<u8> {
-    let mut known: Vec<u8> = look
-        .brightness
-        .iter()
-        .copied()
-        .filter(|of| *of > 0)
-        .collect();
-    known.sort_unstable();
-    let at = |share: f64| {
-        let place = (share * known.len() as f64) as usize;
-        known.get(place.min(known.len().saturating_sub(1))).copied()
-    };
-    let [dark, bright] = [CLIPPED, 1.0 - CLIPPED].map(|share| f64::from(at(share).unwrap_or(1)));
-    let pixel = |brightness: &u8| {
-        let share = (f64::from(*brightness) - dark) / (bright - dark).max(1.0);
-        let grey = (255.0 * share).round() as u8;
-        let opacity = if *brightness > 0 { u8::MAX } else { 0 };
-        [grey, grey, grey, opacity]
-    };
-    look.brightness.iter().flat_map(pixel).collect()
 }

@@ -3,7 +3,6 @@
 use std::{
     fs,
     path::{Path, PathBuf},
-    process::Command,
     sync::atomic::AtomicBool,
 };
 
@@ -13,17 +12,14 @@ use areograph::{
     config::{CalibrationConfig, Document as _, NetConfig, SiteConfig},
     flow::{ArchiveRequest, PUBLISH, Task, archive_filter},
     scene::{
-        LineScene, SceneOptions, write_calibration_loop_scene, write_calibration_scene,
-        write_line_scene, write_plane_scene, write_scene, write_terrain_model_scene,
+        SceneOptions, write_calibration_loop_scene, write_calibration_scene, write_plane_scene,
+        write_scene, write_terrain_model_scene,
     },
     stages::match_laser::{MatchImage, MatchOptions, MatchRequest},
     watch::Watch,
 };
 
-use crate::common::{
-    flows::run_into,
-    mission::{areograph, succeed},
-};
+use crate::common::{flows::run_into, pair::write_three_images};
 
 /// Inputs and a flow over them.
 pub(crate) struct Scene {
@@ -93,7 +89,7 @@ pub(crate) static SHORT: [Scene; 6] = [
     },
     Scene {
         name: "pair",
-        write: write_pair,
+        write: write_three_images,
         run: |folder| run_site_in(folder, "pair.toml"),
         declared: &[
             ("search_footprints", "ReadShots"),
@@ -218,62 +214,4 @@ fn run_model(folder: &Path) -> PathBuf {
         images: vec![image("s1"), image("s2")],
     };
     run(folder, Task::Match(&request))
-}
-
-const LEAP_SECONDS: &str = include_str!("../../../kernels.example/leapseconds.tls");
-
-/// Three images by support data with their pixels, and the shots of passes over them in a table.
-const PAIR: &str = r#"site = "pair"
-kernels.files = ["leapseconds.tls"]
-[[shots]]
-files = ["shots.csv"]
-layout = "areograph"
-[[windows]]
-id = "pair"
-longitude_deg = [296.0, 298.0]
-latitude_deg = [-34.0, -32.0]
-[[images]]
-id = "s1"
-isd = "first/isd/s1.json"
-pixels = "first/images/s1.tif"
-[[images]]
-id = "nd"
-isd = "second/isd/nd.json"
-pixels = "second/images/nd.tif"
-[[images]]
-id = "s2"
-isd = "third/isd/s2.json"
-pixels = "third/images/s2.tif"
-[ties]
-match = true
-[surface]
-cell_m = 200.0
-orthoimage_cell_m = 50.0
-filled = true
-[registration]
-model = "samples"
-"#;
-
-fn write_pair(folder: &Path) {
-    // Files of pixels without labels differ by their sizes; the ground is the same.
-    for (name, lines) in [("first", 400), ("second", 390), ("third", 380)] {
-        let scene = LineScene {
-            seed: 1,
-            size: [lines, 240],
-            is_wrong: false,
-        };
-        write_line_scene(
-            &folder.join(name),
-            &scene,
-            Watch::from(&AtomicBool::new(false)),
-        )
-        .unwrap();
-    }
-    let mut search: Command = areograph();
-    search.args(["--quiet", "pedr", "search"]);
-    search.arg(folder.join("first/pedr"));
-    search.args(["--box=-64.0,-62.0,-34.0,-32.0", "--out"]);
-    succeed(search.arg(folder.join("shots.csv")));
-    fs::write(folder.join("leapseconds.tls"), LEAP_SECONDS).unwrap();
-    fs::write(folder.join("pair.toml"), PAIR).unwrap();
 }

@@ -193,7 +193,7 @@ fn layers(of: &Context) -> Result<Vec<Layer>> {
             form: Form::Contours { label: "height_m" },
         });
     }
-    for orthoimage in site.find::<Vec<Orthoimage>>()?.into_iter().flatten() {
+    for orthoimage in Orthoimage::best(site.book)? {
         let id = &site.images[orthoimage.account.image].times.id;
         let path = format!("images/{id}/orthoimage.tif");
         if !is_written(of, &path) {

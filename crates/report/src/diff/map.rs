@@ -119,7 +119,7 @@ fn kinds(site: &RunDifference) -> [(&'static str, Vec<Moved>); 3] {
 }
 
 /// Axes of one scale that hold all places, and the height of the map.
-fn sheet(places: impl Iterator<Item = (f64, f64)> + Clone) -> (Extent, Extent, u32) {
+pub(crate) fn sheet(places: impl Iterator<Item = (f64, f64)> + Clone) -> (Extent, Extent, u32) {
     let x = Extent::of(places.clone().map(|place| place.0));
     let y = Extent::of(places.map(|place| place.1));
     let wide = f64::from(WIDTH - BESIDE);

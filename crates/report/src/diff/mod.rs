@@ -7,6 +7,8 @@ mod movement;
 
 use std::cmp::Reverse;
 
+pub(super) use map::sheet;
+
 use super::html::{self, Markup, Section, Tone, html, list};
 use crate::difference::{Outcome, RunDifference};
 use areograph_base::error::Result;

@@ -17,6 +17,7 @@ use std::sync::atomic::AtomicBool;
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 
+pub use super::look::OrthoimageLook;
 use super::{
     adjust::{Adjusted, CorrectedImage},
     image_pixels::PixelFiles,
@@ -31,7 +32,8 @@ use areograph_base::{
 };
 use areograph_geom::{height_grid::HeightGrid, pushbroom::Unseen};
 use areograph_store::{
-    stage::{Output, Stage},
+    book::Book,
+    stage::{Output, Round, Stage},
     stage_inputs,
 };
 
@@ -41,12 +43,10 @@ pub use holes::bridged;
 use sight_lines::SightLines;
 
 /// Maximum number of cells of an orthoimage: 1.3 bytes each in its file.
-const CELLS_MAX: usize = 1 << 27;
-/// Cells along the longer side of an orthoimage on a page.
-const LOOK: usize = 1_000;
+pub(crate) const CELLS_MAX: usize = 1 << 27;
 
 stage_inputs! {
-    /// Images with their best orientation and their pixels, and the terrain model.
+    /// Images with their orientation and their pixels, and the terrain model.
     pub struct RectifyImages<'a> {
         /// The images.
         pub images: SiteImages<'a>,
@@ -54,8 +54,10 @@ stage_inputs! {
         pub pixels: PixelFiles<'a>,
         /// The terrain model.
         pub surface: &'a Output<Surface>,
-        /// The adjustment that gave the images their orientation.
+        /// The adjustment of the images, where there is one: images without tie points are left out.
         pub adjusted: AdjustmentOfImages<'a>,
+        /// The orientation of the images: from the kernels, or adjusted.
+        pub round: Round,
         /// Edge of a cell, metres.
         pub cell_m: &'a f64,
     }
@@ -74,6 +76,28 @@ pub struct Orthoimage {
 }
 
 impl Orthoimage {
+    /// The orthoimages of a site with its best orientation; empty if it requests none.
+    ///
+    /// # Errors
+    /// An output that is not known or cannot be read.
+    pub fn best(book: &Book) -> Result<&[Self]> {
+        let adjusted = book.find::<Vec<Self>>(Round::Adjusted)?;
+        let found = adjusted.map_or_else(|| book.find(Round::Initial), |of| Ok(Some(of)))?;
+        Ok(found.map_or(&[], Vec::as_slice))
+    }
+
+    /// Those with the orientation from the kernels, in a site whose best orientation is the adjusted one; empty if it requests
+    /// none.
+    ///
+    /// # Errors
+    /// As [`Self::best`].
+    pub fn before(book: &Book) -> Result<&[Self]> {
+        let found = book
+            .has::<Vec<Self>>(Round::Adjusted)
+            .then(|| book.find::<Vec<Self>>(Round::Initial));
+        Ok(found.transpose()?.flatten().map_or(&[], Vec::as_slice))
+    }
+
     /// Its statistics, which a page shows.
     #[must_use]
     pub fn without_cells(&self) -> Self {
@@ -121,15 +145,6 @@ pub struct OrthoimageAccount {
     pub look: OrthoimageLook,
 }
 
-/// An orthoimage in larger cells.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct OrthoimageLook {
-    /// Rows and columns.
-    pub size: [usize; 2],
-    /// Mean brightness, row by row; 0 where there is none.
-    pub brightness: Vec<u8>,
-}
-
 /// An orthoimage cannot be made.
 #[derive(Debug, thiserror::Error, Cause)]
 #[cause(Input)]
@@ -161,6 +176,10 @@ impl Stage for RectifyImages<'_> {
     type Output = Vec<Orthoimage>;
     stage_inputs!(fingerprint);
 
+    fn part(&self) -> Option<String> {
+        self.round.part()
+    }
+
     fn run(&self, stop: &AtomicBool) -> Result<Vec<Orthoimage>> {
         self.run_watched(stop.into())
     }
@@ -171,7 +190,9 @@ impl Stage for RectifyImages<'_> {
         if surface.account.is_refused {
             return Ok(made);
         }
-        let adjusted = self.adjusted.0.map(Output::value).transpose()?;
+        let tied = self.adjusted.0.map(Output::value).transpose()?;
+        // It states nothing of orientations from kernels.
+        let adjusted = tied.filter(|_| self.round != Round::Initial);
         let oriented = self.images.oriented()?;
         let times = self.images.0.iter().map(|image| image.times.value());
         let times: Vec<&ImageTimes> = times.collect::<Result<_>>()?;
@@ -186,7 +207,7 @@ impl Stage for RectifyImages<'_> {
                 unseen,
             })?;
             // Its own error is not the shared error of the adjusted images.
-            if adjusted.is_some_and(|adjusted| !adjusted.is_tied(index)) {
+            if tied.is_some_and(|tied| !tied.is_tied(index)) {
                 continue;
             }
             let adjustment = adjusted.and_then(|adjusted| AdjustedView::of(adjusted, index));
@@ -295,29 +316,6 @@ fn rectified(
         brightness: brightness.pixels,
         sigmas_m,
     }))
-}
-
-impl OrthoimageLook {
-    /// In cells so large that no side has more than [`LOOK`] of them.
-    fn of([rows, columns]: [usize; 2], pixels: &[u8]) -> Self {
-        let step = rows.max(columns).div_ceil(LOOK).max(1);
-        let size = [rows.div_ceil(step), columns.div_ceil(step)];
-        let mut sums = vec![[0_u32; 2]; size[0] * size[1]];
-        for (row, pixels) in pixels.chunks_exact(columns.max(1)).enumerate() {
-            for (column, pixel) in pixels.iter().enumerate() {
-                if *pixel > 0 {
-                    let [sum, count] = &mut sums[row / step * size[1] + column / step];
-                    *sum += u32::from(*pixel);
-                    *count += 1;
-                }
-            }
-        }
-        let mean = |[sum, count]: &[u32; 2]| u8::try_from(sum / (*count).max(1)).unwrap_or(u8::MAX);
-        Self {
-            size,
-            brightness: sums.iter().map(mean).collect(),
-        }
-    }
 }
 
 #[cfg(test)]

@@ -9,7 +9,10 @@
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::*;
-use crate::invented_pair::{Invented, LINES, RADIUS_M};
+use crate::{
+    invented_pair::{Invented, LINES, RADIUS_M},
+    look::LOOK,
+};
 use areograph_geom::{
     ellipsoid::spherical_to_xyz_m,
     imaging::{Affine, Patch, match_least_squares, search},

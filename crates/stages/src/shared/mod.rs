@@ -5,11 +5,15 @@ pub(crate) mod ground;
 pub mod image_pixels;
 pub(crate) mod image_view;
 #[cfg(test)]
+pub(crate) mod invented_orthoimage;
+#[cfg(test)]
 pub(crate) mod invented_pair;
 pub mod line_camera;
+pub mod look;
 pub mod mola_surface;
 pub mod orientation;
 pub mod oriented;
+pub(crate) mod raster;
 pub(crate) mod shot_heights;
 pub mod site_image;
 pub(crate) mod turn;

@@ -106,7 +106,9 @@ impl Mission {
         let text = fs::read_to_string(written).unwrap();
         let named = text.replace("site = \"", "site = \"mapped_");
         let path = self.folder.join(format!("sites/mapped_{site}.toml"));
-        let table = format!("\n[surface]\ncell_m = {cell_m:.1}\northoimage_cell_m = 5.0\n");
+        let table = format!(
+            "\n[surface]\ncell_m = {cell_m:.1}\northoimage_cell_m = 5.0\northoimages_before = true\n"
+        );
         fs::write(&path, named + &table).unwrap();
         path
     }
@@ -374,6 +376,7 @@ fn matched_ties_are_within_what_they_state_and_adjust_as_well_as_given_ones() {
             let written = mission.folder.join(format!("sites/{}.toml", site.id));
             let mapped = run(&mission.mapped_site(&written, site.id, 60.0), folder.path());
             surface::Published::of(&mapped).hold_against(&mission.terrain);
+            orthoimages::offsets_are_true(&mission, &mapped);
             let (judged, apart) = orthoimages::judged(&mission, &mapped);
             // Without jitter: 0.3 cells of 5 m.
             assert!(apart <= 0.3, "{apart}");

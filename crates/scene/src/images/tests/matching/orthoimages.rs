@@ -44,8 +44,8 @@ pub(super) struct Published {
 }
 
 impl Published {
-    pub(super) fn of(products: &Path, image: &str) -> Self {
-        let path = products.join(format!("images/{image}/orthoimage.tif"));
+    pub(super) fn of(products: &Path, image: &str, file: &str) -> Self {
+        let path = products.join(format!("images/{image}/{file}"));
         let mut decoder = Decoder::new(File::open(path).unwrap()).unwrap();
         let (columns, rows) = decoder.dimensions().unwrap();
         let mut numbers = |tag| decoder.get_tag_f64_vec(tag).unwrap();
@@ -209,6 +209,43 @@ impl Judged {
     }
 }
 
+/// Errors of an orthoimage of a mission, metres.
+fn errors_m(mission: &Mission, id: &str, orthoimage: &Published) -> Vec<Vector2<f64>> {
+    let image = IMAGES.iter().find(|image| image.id == id).unwrap();
+    let (_, pixels) = decoded(&mission.folder.join("images").join(image_name(id)));
+    let samples = image.samples() as usize;
+    let pixels = Patch {
+        first: [0, 0],
+        size: [pixels.len() / samples, samples],
+        values: pixels.into_iter().map(f32::from).collect(),
+    };
+    orthoimage.errors_m(&mission.image(id), &mission.terrain, &pixels)
+}
+
+/// The offsets of the first pair before the adjustment are the difference of the errors of its orthoimages against the true
+/// ground, and those after it are small.
+pub(super) fn offsets_are_true(mission: &Mission, products: &Path) {
+    let document = fs::read(products.join("orthoimages.json")).unwrap();
+    let document: serde_json::Value = serde_json::from_slice(&document).unwrap();
+    let number = |place: &str| document.pointer(place).unwrap().as_f64().unwrap();
+    let mean_m = |place: &str| {
+        let id = document.pointer(place).unwrap().as_str().unwrap();
+        let before = Published::of(products, id, "orthoimage_before.tif");
+        let errors_m = errors_m(mission, id, &before);
+        assert!(errors_m.len() >= 30);
+        errors_m.iter().sum::<Vector2<f64>>() / errors_m.len() as f64
+    };
+    let expected_m = mean_m("/pairs/0/images/1") - mean_m("/pairs/0/images/0");
+    let found_m = Vector2::from_fn(|axis, _| number(&format!("/pairs/0/before/median_m/{axis}")));
+    let after_m = number("/pairs/0/after/rms_m");
+    println!("offsets before: {found_m:.2?} m, true {expected_m:.2?} m; after: rms {after_m:.2} m");
+    let pixel_m = number("/orthoimages/0/pixel_m");
+    // A known misregistration of many pixels, found within 0.3 of them.
+    assert!(expected_m.norm() > 10.0 * pixel_m);
+    assert!((found_m - expected_m).norm() <= 0.3 * pixel_m);
+    assert!(after_m <= 0.3 * pixel_m);
+}
+
 /// The errors of all orthoimages of a site, and how far those of the first two are apart, root mean square in cells.
 pub(super) fn judged(mission: &Mission, products: &Path) -> (Vec<Judged>, f64) {
     let document = fs::read(products.join("orthoimages.json")).unwrap();
@@ -216,17 +253,8 @@ pub(super) fn judged(mission: &Mission, products: &Path) -> (Vec<Judged>, f64) {
     let (mut made, mut judged) = (Vec::new(), Vec::new());
     for stated in document["orthoimages"].as_array().unwrap() {
         let id = stated["image"].as_str().unwrap();
-        let image = IMAGES.iter().find(|image| image.id == id).unwrap();
-        let orthoimage = Published::of(products, id);
-        let (_, pixels) = decoded(&mission.folder.join("images").join(image_name(id)));
-        let samples = image.samples() as usize;
-        let pixels = Patch {
-            first: [0, 0],
-            size: [pixels.len() / samples, samples],
-            values: pixels.into_iter().map(f32::from).collect(),
-        };
-        let errors_m = orthoimage.errors_m(&mission.image(id), &mission.terrain, &pixels);
-        judged.push(Judged::of(id, &errors_m, stated));
+        let orthoimage = Published::of(products, id, "orthoimage.tif");
+        judged.push(Judged::of(id, &errors_m(mission, id, &orthoimage), stated));
         made.push(orthoimage);
     }
     let shifts = made[0].shifts(&made[1]);

@@ -1,0 +1,106 @@
+//! Offsets of invented orthoimages with a known shift.
+
+use std::f64::consts::TAU;
+
+use super::*;
+use crate::invented_orthoimage::{CELL_M, orthoimage};
+use areograph_geom::random::Random;
+
+/// Ground without repetition: waves of all directions and lengths from 6 to 60 cells, about 120.
+fn waves() -> Vec<[f64; 4]> {
+    let mut random = Random::new(7, "ground");
+    let mut wave = || {
+        let length = random.between_log(6.0, 60.0);
+        let (direction, phase) = (random.between(0.0, TAU), random.between(0.0, TAU));
+        let [down, across] = [direction.sin(), direction.cos()].map(|of| of * TAU / length);
+        [down, across, phase, length.sqrt()]
+    };
+    (0..60).map(|_| wave()).collect()
+}
+
+fn ground(waves: &[[f64; 4]], [row, column]: [f64; 2]) -> f64 {
+    let waves = waves
+        .iter()
+        .map(|[down, across, phase, size]| size * (down * row + across * column + phase).sin());
+    (120.0 + 1.8 * waves.sum::<f64>()).clamp(1.0, 255.0)
+}
+
+/// The ground, shifted southwards and eastwards by some cells; without the cells of an eastern strip.
+fn shifted(image: usize, first: [i64; 2], by: [f64; 2]) -> Orthoimage {
+    let waves = waves();
+    let east = first[1] + 300;
+    orthoimage(image, first, [400, 330], move |cell| {
+        if cell[1] >= east {
+            return 0.0;
+        }
+        ground(&waves, [0, 1].map(|axis| cell[axis] as f64 - by[axis]))
+    })
+}
+
+#[test]
+fn known_shifts_are_found_between_cells() {
+    let one = shifted(3, [-90, 1_000], [0.0; 2]);
+    // Less than a cell, and farther than the room around a place without the shift of the complete orthoimages.
+    for by in [[0.3, -0.4], [-70.25, 95.6]] {
+        let other = shifted(5, [-160, 1_020], by);
+        let found = offsets(&one, &other).unwrap();
+        let medians_m = found.summaries_m().map(|of| of.median);
+        println!(
+            "{} of {} places: {medians_m:?} m",
+            found.places.len(),
+            found.squares
+        );
+        assert_eq!(found.images, [3, 5]);
+        assert!(found.places.len() >= 12 && found.places.len() * 10 >= found.squares as usize * 9);
+        for place in &found.places {
+            for (axis, expected) in [by[1], -by[0]].into_iter().enumerate() {
+                let error_m = place.offset_m[axis] - expected * CELL_M;
+                // A tenth of a cell: brightness is rounded to whole numbers.
+                assert!(error_m.abs() < 0.1 * CELL_M, "{place:?}");
+            }
+            assert!(place.sigma_m.iter().all(|of| *of < 0.1 * CELL_M) && place.correlation > 0.9);
+        }
+    }
+}
+
+#[test]
+fn other_ground_does_not_match() {
+    let waves: Vec<[f64; 4]> = waves()
+        .into_iter()
+        .map(|[down, across, phase, size]| [across, -down, phase, size])
+        .collect();
+    let one = shifted(0, [0, 0], [0.0; 2]);
+    let other = orthoimage(1, [0, 0], [400, 330], move |cell| {
+        ground(&waves, cell.map(|at| at as f64))
+    });
+    // A few squares match by chance, and are not trusted.
+    let found = offsets(&one, &other).unwrap();
+    assert!(found.squares > 10 && found.places.is_empty(), "{found:?}");
+    assert_eq!(found.rms_m(), None);
+    let apart = shifted(1, [0, 5_000], [0.0; 2]);
+    assert_eq!(offsets(&one, &apart), None);
+}
+
+#[test]
+fn a_mismatch_does_not_count() {
+    let place = |east_m: f64| PlaceOffset {
+        cell: [0; 2],
+        place_rad: [0.0; 2],
+        offset_m: [east_m, 0.0],
+        sigma_m: [0.1; 2],
+        correlation: 0.9,
+    };
+    // A drift of 100 m along the image, and a place 400 m beside it.
+    let drift_m = (0..=10).map(|at| 10.0 * f64::from(at));
+    let mut pair = OrthoimageOffsets {
+        images: [0, 1],
+        cell_m: CELL_M,
+        squares: 20,
+        places: drift_m.chain([450.0]).map(place).collect(),
+    };
+    pair.leave_out_mismatches();
+    assert_eq!(pair.places.len(), 11);
+    pair.squares = 60;
+    pair.leave_out_mismatches();
+    assert!(pair.places.is_empty());
+}

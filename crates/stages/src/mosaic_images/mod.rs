@@ -1,0 +1,431 @@
+//! A mosaic of the orthoimages of a site: every cell is taken from one image, and a second layer identifies it.
+//!
+//! `seams.rs` chooses the image of every block of cells, `balance.rs` the tones. No brightness is mixed or interpolated: a cell
+//! has the brightness of its image, changed by the gain and the offset of that image if tones are balanced. Where the image of
+//! a block lacks a cell, the first image that has it supplies it; where none has it, the cell stays empty.
+//!
+//! Besides the mosaic, two bytes for each cell, memory is bounded by the number of blocks; tones and seams are found in one
+//! pass over strips of blocks, and the mosaic is written in a second.
+
+#![allow(
+    clippy::cast_possible_wrap,
+    reason = "numbers of cells of a map are far below 2⁶³"
+)]
+
+mod balance;
+mod blocks;
+mod seams;
+
+use std::sync::atomic::AtomicBool;
+
+use nalgebra::Vector2;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::{
+    compare_orthoimages::{EDGE, OrthoimageOffsets, PlaceOffset},
+    look::OrthoimageLook,
+    map_surface::Surface,
+    raster::{Raster, first_cell},
+    rectify_images::{CELLS_MAX, Orthoimage},
+    site_image::SiteImages,
+};
+use areograph_base::{
+    error::{Cause, Result},
+    watch::Watch,
+};
+use areograph_geom::{
+    ellipsoid::spherical_to_xyz_m,
+    height_grid::HeightGrid,
+    pushbroom::{Projector, Unseen},
+    statistics::median,
+};
+use areograph_store::{
+    stage::{Output, Round, Stage},
+    stage_inputs,
+};
+
+use balance::Tone;
+use blocks::Survey;
+use seams::Set;
+
+/// Rows and columns of the detail around a seam.
+const DETAIL: usize = 240;
+
+stage_inputs! {
+    /// Orthoimages of one orientation, and the images that they are of.
+    pub struct MosaicImages<'a> {
+        /// Their orientation.
+        pub round: Round,
+        /// The images.
+        pub images: SiteImages<'a>,
+        /// The terrain model.
+        pub surface: &'a Output<Surface>,
+        /// The orthoimages.
+        pub orthoimages: &'a Output<Vec<Orthoimage>>,
+        /// Their offsets.
+        pub offsets: &'a Output<Vec<OrthoimageOffsets>>,
+        /// Whether tones are balanced.
+        pub balance: &'a bool,
+    }
+}
+
+/// A mosaic.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Mosaic {
+    /// Statistics.
+    pub account: MosaicAccount,
+    /// Brightness, row by row; 0 where there is none.
+    pub brightness: Vec<u8>,
+    /// Number of the orthoimage that a cell is taken from, from 1, in the order of [`MosaicAccount::images`]; 0 for an empty
+    /// cell.
+    pub sources: Vec<u8>,
+}
+
+/// Statistics of a mosaic.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MosaicAccount {
+    /// Cells of the map, without heights.
+    pub map: HeightGrid,
+    /// Latitude at which cells are as wide as high, radians.
+    pub parallel_rad: f64,
+    /// Edge of a cell, metres.
+    pub cell_m: f64,
+    /// Its orthoimages.
+    pub images: Vec<MosaicPart>,
+    /// Offsets along the seams.
+    pub seams: Vec<SeamOffsets>,
+    /// The mosaic in larger cells, for display.
+    pub look: OrthoimageLook,
+    /// Cells around a seam near the middle; `None` without a seam.
+    pub detail: Option<MosaicDetail>,
+}
+
+/// An orthoimage in a mosaic.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MosaicPart {
+    /// Index of the image.
+    pub image: usize,
+    /// Gain and offset of its brightness, grey values.
+    pub tone: [f64; 2],
+    /// Number of cells taken from it.
+    pub cells: u32,
+}
+
+/// Offsets of two images where a seam between them passes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SeamOffsets {
+    /// Indices of the images.
+    pub images: [usize; 2],
+    /// Number of compared squares that the seam crosses.
+    pub places: u32,
+    /// Root mean square offset in them, both axes together, metres.
+    pub rms_m: f64,
+}
+
+/// Cells around a seam.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct MosaicDetail {
+    /// Rows and columns.
+    pub size: [usize; 2],
+    /// Brightness, row by row; 0 where there is none.
+    pub brightness: Vec<u8>,
+    /// See [`Mosaic::sources`].
+    pub sources: Vec<u8>,
+}
+
+/// A mosaic cannot be made.
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Input)]
+enum MosaicError {
+    #[error("image {image}: its rays do not intersect the ground ({unseen})")]
+    #[cause("check the kernels and times of the image")]
+    Unseen { image: String, unseen: Unseen },
+    #[error(
+        "{count} orthoimages; expected at most {} for surface.mosaic",
+        Set::MOST
+    )]
+    #[cause("divide the site, or set surface.mosaic = false")]
+    TooMany { count: usize },
+    #[error("the mosaic requires {cells} cells of {cell_m} m; expected at most {CELLS_MAX}")]
+    #[cause("increase surface.orthoimage_cell_m, or set surface.mosaic = false")]
+    TooLarge { cell_m: f64, cells: usize },
+}
+
+impl Mosaic {
+    /// Its statistics, which a page shows.
+    #[must_use]
+    pub fn without_cells(&self) -> Self {
+        Self {
+            account: self.account.clone(),
+            brightness: Vec::new(),
+            sources: Vec::new(),
+        }
+    }
+}
+
+impl Stage for MosaicImages<'_> {
+    const NAME: &'static str = "mosaic_images";
+    type Output = Option<Mosaic>;
+    stage_inputs!(fingerprint);
+
+    fn part(&self) -> Option<String> {
+        self.round.part()
+    }
+
+    fn run(&self, stop: &AtomicBool) -> Result<Option<Mosaic>> {
+        self.run_watched(stop.into())
+    }
+
+    fn run_watched(&self, watch: Watch<'_>) -> Result<Option<Mosaic>> {
+        let orthoimages = self.orthoimages.value()?;
+        let surface = self.surface.value()?;
+        let look = &surface.account.look.heights;
+        let known = look.heights_m.iter().filter(|of| !of.is_nan());
+        let height_m = median(&mut known.map(|of| f64::from(*of)).collect::<Vec<_>>());
+        let oriented = self.images.oriented()?;
+        let mut cameras = Vec::new();
+        for orthoimage in orthoimages {
+            let camera = oriented[orthoimage.account.image].oriented_camera();
+            let projector = Projector::new(camera.orientation, camera.lines());
+            let projector = projector.map_err(|unseen| MosaicError::Unseen {
+                image: camera.id.clone(),
+                unseen,
+            })?;
+            cameras.push((projector.through(camera.detector.distortion), camera));
+        }
+        let inside_m = |of: usize, [longitude_rad, latitude_rad]: [f64; 2]| {
+            let (projector, camera) = &cameras[of];
+            let radius_m = look.radius_m + height_m;
+            let ground_m = spherical_to_xyz_m(longitude_rad, latitude_rad, radius_m);
+            let place = projector.project(&ground_m).ok().and_then(|seen| {
+                let focal_px = camera.detector.focal_px(&seen.camera_m).ok()?;
+                let line = camera.line_times.line_of_offset(seen.x);
+                Some(Vector2::new(line, camera.detector.sample(focal_px.y)))
+            });
+            let size = Vector2::new(camera.lines(), camera.detector.samples);
+            let inside_px = place.map(|place| place.inf(&(size - place)).min());
+            inside_px.unwrap_or_default().max(0.0) * orthoimages[of].account.pixel_m
+        };
+        mosaic(
+            orthoimages,
+            self.offsets.value()?,
+            *self.balance,
+            inside_m,
+            watch,
+        )
+    }
+}
+
+/// The mosaic of orthoimages, by the distance from the edge of its image, metres, at which an orthoimage shows a place of this
+/// longitude and latitude; `None` without an orthoimage.
+fn mosaic(
+    orthoimages: &[Orthoimage],
+    offsets: &[OrthoimageOffsets],
+    is_balanced: bool,
+    inside_m: impl Fn(usize, [f64; 2]) -> f64 + Sync,
+    watch: Watch<'_>,
+) -> Result<Option<Mosaic>> {
+    let Some(map) = common_map(orthoimages)? else {
+        return Ok(None);
+    };
+    let first = &orthoimages[0].account;
+    let survey = Survey::of(&map, orthoimages, is_balanced, inside_m, watch)?;
+    let labels = survey.blocks.labels();
+    let tables: Vec<[u8; 256]> = survey.tones.iter().map(Tone::table).collect();
+    let cells = composed(&map, orthoimages, (&labels, survey.edge), &tables, watch)?;
+    let mut counts = [0_u32; 256];
+    for source in &cells.sources {
+        counts[usize::from(*source)] += 1;
+    }
+    let parts = orthoimages.iter().zip(&survey.tones).zip(&counts[1..]);
+    let parts = parts.map(|((of, tone), cells)| MosaicPart {
+        image: of.account.image,
+        tone: [tone.gain, tone.offset],
+        cells: *cells,
+    });
+    let parts: Vec<MosaicPart> = parts.collect();
+    let sources = Raster::of(&map, &cells.sources);
+    let account = MosaicAccount {
+        parallel_rad: first.parallel_rad,
+        cell_m: first.cell_m,
+        seams: offsets
+            .iter()
+            .filter_map(|pair| seam(pair, &parts, &sources))
+            .collect(),
+        images: parts,
+        look: OrthoimageLook::of(map.size, &cells.brightness),
+        detail: detail(&sources, &cells.brightness),
+        map,
+    };
+    Ok(Some(Mosaic {
+        account,
+        brightness: cells.brightness,
+        sources: cells.sources,
+    }))
+}
+
+/// Cells over all orthoimages; `None` without one.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "the extent of a few maps"
+)]
+fn common_map(orthoimages: &[Orthoimage]) -> std::result::Result<Option<HeightGrid>, MosaicError> {
+    if orthoimages.len() > Set::MOST {
+        let count = orthoimages.len();
+        return Err(MosaicError::TooMany { count });
+    }
+    let Some((one, others)) = orthoimages.split_first() else {
+        return Ok(None);
+    };
+    let corners = |of: &Orthoimage| {
+        let first = first_cell(&of.account.map);
+        let end = [0, 1].map(|axis| first[axis] + of.account.map.size[axis] as i64);
+        [first, end]
+    };
+    let own = corners(one);
+    let [mut first, mut end] = own;
+    for other in others {
+        let [start, stop] = corners(other);
+        for axis in 0..2 {
+            first[axis] = first[axis].min(start[axis]);
+            end[axis] = end[axis].max(stop[axis]);
+        }
+    }
+    let size = [0, 1].map(|axis| (end[axis] - first[axis]) as usize);
+    let cells = size[0].saturating_mul(size[1]);
+    let map = &one.account.map;
+    if cells > CELLS_MAX {
+        let cell_m = one.account.cell_m;
+        return Err(MosaicError::TooLarge { cell_m, cells });
+    }
+    let before = [0, 1].map(|axis| (first[axis] - own[0][axis]) as f64);
+    Ok(Some(HeightGrid {
+        size,
+        first_rad: map.place_rad(before),
+        ..map.clone()
+    }))
+}
+
+/// Cells of a mosaic, row by row.
+struct Composed {
+    brightness: Vec<u8>,
+    sources: Vec<u8>,
+}
+
+/// Every cell from the orthoimage of its block.
+fn composed(
+    map: &HeightGrid,
+    orthoimages: &[Orthoimage],
+    (labels, edge): (&[u8], usize),
+    tables: &[[u8; 256]],
+    watch: Watch<'_>,
+) -> Result<Composed> {
+    let [rows, columns] = map.size;
+    let across = columns.div_ceil(edge);
+    let first = first_cell(map);
+    let rasters = orthoimages
+        .iter()
+        .map(|of| Raster::of(&of.account.map, &of.brightness));
+    let rasters: Vec<Raster<'_>> = rasters.collect();
+    let mut made = Composed {
+        brightness: vec![0; rows * columns],
+        sources: vec![0; rows * columns],
+    };
+    let lines = made
+        .brightness
+        .par_chunks_mut(columns)
+        .zip(made.sources.par_chunks_mut(columns))
+        .enumerate();
+    lines
+        .try_for_each(|(row, (brightness, sources))| {
+            watch.check()?;
+            let cells = brightness.iter_mut().zip(sources).enumerate();
+            for (column, (brightness, source)) in cells {
+                let cell = [first[0] + row as i64, first[1] + column as i64];
+                let label = labels[row / edge * across + column / edge];
+                let own = rasters.get(usize::from(label)).map(|of| of.at(cell));
+                let other = || {
+                    let mut others = (0_u8..).zip(rasters.iter().map(|of| of.at(cell)));
+                    others.find(|(_, pixel)| *pixel > 0)
+                };
+                let own = own.filter(|pixel| *pixel > 0).map(|pixel| (label, pixel));
+                if let Some((of, pixel)) = own.or_else(other) {
+                    *brightness = tables[usize::from(of)][usize::from(pixel)];
+                    *source = of + 1;
+                }
+            }
+            Ok(())
+        })
+        .map(|()| made)
+}
+
+/// Offsets of a pair in the squares that its seam crosses; `None` without one.
+fn seam(
+    pair: &OrthoimageOffsets,
+    parts: &[MosaicPart],
+    sources: &Raster<'_>,
+) -> Option<SeamOffsets> {
+    let number = |image: usize| (1_u8..).zip(parts).find(|(_, of)| of.image == image);
+    let [one, other] = pair
+        .images
+        .map(|image| number(image).map(|(number, _)| number));
+    let numbers = [one?, other?];
+    let half = i64::from(EDGE / 2);
+    let is_crossed = |place: &&PlaceOffset| {
+        let span = |axis: usize| place.cell[axis] - half..=place.cell[axis] + half;
+        let mut found = [false; 2];
+        for cell in span(0).flat_map(|row| span(1).map(move |column| [row, column])) {
+            let source = sources.at(cell);
+            for (found, number) in found.iter_mut().zip(numbers) {
+                *found |= source == number;
+            }
+        }
+        found == [true; 2]
+    };
+    let crossed = OrthoimageOffsets {
+        places: pair.places.iter().filter(is_crossed).copied().collect(),
+        ..*pair
+    };
+    Some(SeamOffsets {
+        images: pair.images,
+        places: u32::try_from(crossed.places.len()).unwrap_or(u32::MAX),
+        rms_m: crossed.rms_m()?,
+    })
+}
+
+/// The cells around the seam that is nearest to the middle.
+fn detail(sources: &Raster<'_>, brightness: &[u8]) -> Option<MosaicDetail> {
+    let [rows, columns] = sources.size;
+    let pairs = sources.pixels.windows(2).enumerate();
+    let seams = pairs.filter(|(at, pair)| {
+        !pair.contains(&0) && pair[0] != pair[1] && at % columns + 1 < columns
+    });
+    let from_middle = |at: usize| {
+        let [row, column] = [at / columns, at % columns];
+        (2 * row).abs_diff(rows).max((2 * column).abs_diff(columns))
+    };
+    let (middle, _) = seams.min_by_key(|(at, _)| from_middle(*at))?;
+    let size = [rows.min(DETAIL), columns.min(DETAIL)];
+    let start = |at: usize, axis: usize| {
+        let start = at.saturating_sub(size[axis] / 2);
+        start.min(sources.size[axis] - size[axis])
+    };
+    let [row, column] = [start(middle / columns, 0), start(middle % columns, 1)];
+    let cells = |of: &[u8]| -> Vec<u8> {
+        let lines = (row..row + size[0]).map(|row| row * columns + column);
+        lines
+            .flat_map(|at| &of[at..at + size[1]])
+            .copied()
+            .collect()
+    };
+    Some(MosaicDetail {
+        size,
+        brightness: cells(brightness),
+        sources: cells(sources.pixels),
+    })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,202 @@
+//! Orthoimages of a pair before and after the adjustment of a known misregistration, and their mosaics.
+
+#![allow(
+    clippy::cast_possible_wrap,
+    clippy::disallowed_methods,
+    clippy::panic,
+    clippy::print_stdout,
+    clippy::unwrap_used,
+    reason = "tests work in temporary folders with small maps, and may fail loudly"
+)]
+
+use std::{fs, fs::File, path::Path};
+
+use areograph::{
+    config::{Document as _, SiteConfig},
+    flow::Task,
+};
+use serde_json::{Value, json};
+use tiff::{
+    decoder::{Decoder, DecodingResult},
+    tags::Tag,
+};
+
+use crate::common::{self, flows::run_into, pair::write_pair, readers};
+
+/// Distance by which the support data of the second image, which looks down, are displaced along its flight, metres.
+const ALONG_M: f64 = 300.0;
+
+/// A raster as another program reads it.
+struct Raster {
+    size: [usize; 2],
+    /// Columns eastwards and rows southwards of its corner from 0° E 0° N.
+    corner: [i64; 2],
+    bytes: Vec<u8>,
+}
+
+impl Raster {
+    fn read(path: &Path) -> Self {
+        let mut decoder = Decoder::new(File::open(path).unwrap()).unwrap();
+        let (columns, rows) = decoder.dimensions().unwrap();
+        let corner_m = decoder.get_tag_f64_vec(Tag::ModelTiepointTag).unwrap();
+        let cell_m = decoder.get_tag_f64_vec(Tag::ModelPixelScaleTag).unwrap()[0];
+        let DecodingResult::U8(bytes) = decoder.read_image().unwrap() else {
+            panic!("other numbers");
+        };
+        #[allow(clippy::cast_possible_truncation, reason = "cells of a map")]
+        let corner = [corner_m[3], -corner_m[4]].map(|at| (at / cell_m).round() as i64);
+        Self {
+            size: [rows as usize, columns as usize],
+            corner,
+            bytes,
+        }
+    }
+
+    /// The value of the cell at this row and column of `other`; 0 outside.
+    fn at_cell_of(&self, other: &Self, [row, column]: [usize; 2]) -> u8 {
+        let place = |axis: usize, at: usize| {
+            usize::try_from(at as i64 + other.corner[axis] - self.corner[axis]).ok()
+        };
+        let (row, column) = (place(1, row), place(0, column));
+        let inside = row
+            .zip(column)
+            .filter(|(row, column)| *row < self.size[0] && *column < self.size[1]);
+        inside.map_or(0, |(row, column)| self.bytes[row * self.size[1] + column])
+    }
+}
+
+/// Displaces the positions of support data, which the scene writes in km, along the flight.
+fn displace(path: &Path) {
+    let mut isd = common::json(path);
+    let of = &mut isd["instrument_position"];
+    let velocities = of["velocities"].as_array().unwrap().clone();
+    for (place, velocity) in of["positions"]
+        .as_array_mut()
+        .unwrap()
+        .iter_mut()
+        .zip(velocities)
+    {
+        let axes: Vec<f64> = velocity
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(common::number)
+            .collect();
+        let speed = axes.iter().map(|of| of * of).sum::<f64>().sqrt();
+        for (axis, along) in place.as_array_mut().unwrap().iter_mut().zip(axes) {
+            *axis = json!(common::number(axis) + 1e-3 * ALONG_M * along / speed);
+        }
+    }
+    fs::write(path, isd.to_string()).unwrap();
+}
+
+/// Every cell of a mosaic is that of the orthoimage that the sources identify, and no cell is invented or left out.
+fn is_of_its_sources(products: &Path, [mosaic, sources, orthoimage]: [&str; 3], images: &[Value]) {
+    let [mosaic, sources] = [mosaic, sources].map(|name| Raster::read(&products.join(name)));
+    let orthoimages = images.iter().map(|of| {
+        let id = of["image"].as_str().unwrap();
+        Raster::read(&products.join(format!("images/{id}/{orthoimage}")))
+    });
+    let orthoimages: Vec<Raster> = orthoimages.collect();
+    let mut taken = vec![0_u64; orthoimages.len()];
+    for (at, (brightness, source)) in mosaic.bytes.iter().zip(&sources.bytes).enumerate() {
+        let cell = [at / mosaic.size[1], at % mosaic.size[1]];
+        let of = |index: usize| orthoimages[index].at_cell_of(&mosaic, cell);
+        match usize::from(*source).checked_sub(1) {
+            Some(index) => {
+                taken[index] += 1;
+                assert!(*brightness > 0 && *brightness == of(index), "{cell:?}");
+            }
+            None => assert!(*brightness == 0 && (0..taken.len()).all(|index| of(index) == 0)),
+        }
+    }
+    assert!(taken.iter().all(|cells| *cells > 1_000), "{taken:?}");
+}
+
+#[test]
+fn a_known_misregistration_is_measured_before_the_adjustment_and_gone_after_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    write_pair(folder);
+    displace(&folder.join("second/isd/nd.json"));
+    let site = folder.join("pair.toml");
+    let text = fs::read_to_string(&site).unwrap();
+    // Cells of about a pixel, and brightness as in the images.
+    let [was, is] = [
+        "orthoimage_cell_m = 50.0",
+        "orthoimage_cell_m = 25.0\nmosaic_balance = false",
+    ];
+    assert!(text.contains(was));
+    fs::write(&site, text.replace(was, is)).unwrap();
+    let config = SiteConfig::load(&site).unwrap().config;
+    let products = run_into(Task::Site(&config), &folder.join("out"), false)
+        .unwrap()
+        .folder;
+
+    let document = common::json(&products.join("orthoimages.json"));
+    let pair = &document["pairs"][0];
+    println!("{pair:#}");
+    let number = |place: &str| common::number(pair.pointer(place).unwrap());
+    let pixel_m = common::number(&document["orthoimages"][0]["pixel_m"]);
+    for state in ["before", "after"] {
+        let [squares, places] = ["squares", "places"].map(|of| number(&format!("/{state}/{of}")));
+        assert!(
+            places >= 8.0 && places >= 0.8 * squares,
+            "{state}: {places} of {squares}"
+        );
+    }
+    let median_m = number("/before/median_m/0").hypot(number("/before/median_m/1"));
+    // A third of a pixel: rays of a camera displaced along level ground are displaced as far.
+    assert!((median_m - ALONG_M).abs() < 0.3 * pixel_m, "{median_m}");
+    assert!((number("/before/rms_m") - ALONG_M).abs() < 0.3 * pixel_m);
+    assert!(number("/after/rms_m") <= 0.3 * pixel_m);
+
+    let mosaic = common::json(&products.join("mosaic.json"));
+    let images = mosaic["images"].as_array().unwrap();
+    assert!(
+        images
+            .iter()
+            .all(|of| of["gain"] == json!(1.0) && of["offset"] == json!(0.0))
+    );
+    is_of_its_sources(
+        &products,
+        ["mosaic.tif", "mosaic_source.tif", "orthoimage.tif"],
+        images,
+    );
+    let before = [
+        "mosaic_before.tif",
+        "mosaic_before_source.tif",
+        "orthoimage_before.tif",
+    ];
+    is_of_its_sources(&products, before, images);
+    for (seams, least_m, most_m) in [
+        ("seams_before", 0.9 * ALONG_M, 1.1 * ALONG_M),
+        // A tenth of a pixel more than the limit of all places: few lie at a seam.
+        ("seams", 0.0, 0.4 * pixel_m),
+    ] {
+        let rms_m = common::number(&mosaic[seams][0]["rms_m"]);
+        assert!((least_m..=most_m).contains(&rms_m), "{seams}: {rms_m}");
+    }
+    let report = fs::read_to_string(products.join("report/index.html")).unwrap();
+    assert!(report.contains("The orthoimages of s1 and nd differ by"));
+    assert!(report.contains("At the seam of s1 and nd, the images differ by"));
+    for name in ["mosaic.tif", "mosaic_source.tif", "mosaic_before.tif"] {
+        let Some(mut gdal) = readers::program("gdalinfo", "mosaics in GDAL") else {
+            return;
+        };
+        let path = products.join(name);
+        let found = readers::output(gdal.args(["-json", "-checksum"]).arg(&path));
+        let found: Value = serde_json::from_str(&found).unwrap();
+        let band = &found["bands"][0];
+        assert_eq!(
+            (&band["type"], &band["noDataValue"]),
+            (&json!("Byte"), &json!(0.0))
+        );
+        let Raster {
+            size: [rows, columns],
+            ..
+        } = Raster::read(&path);
+        assert_eq!(found["size"], json!([columns, rows]));
+        assert!(common::number(&band["checksum"]) > 0.0);
+    }
+}
