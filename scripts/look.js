@@ -2,6 +2,7 @@
 const fs = require('fs');
 const path = require('path');
 const { chromium } = require('playwright-core');
+const { explore } = require('./look-explore.js');
 
 const [chromiumPath, pictures, ...pages] = process.argv.slice(2);
 const axe = fs.readFileSync(require.resolve('axe-core/axe.min.js'), 'utf8');
@@ -81,6 +82,9 @@ async function look(browser, file, view) {
     for (const view of views) {
       // A page that crashes the browser is a problem of that page.
       const problems = await look(browser, file, view).catch((error) => [error.message]);
+      if (path.basename(file) === 'explore.html') {
+        problems.push(...await explore(browser, file, view).catch((error) => [error.message]));
+      }
       for (const problem of problems) {
         failed = true;
         console.error(`look: ${file} (${view.name}): ${problem}`);
