@@ -40,7 +40,7 @@ function compared({ title, values }, footprints, registered) {
   if (own) {
     count += compare('longitude', number(values['east longitude']), own.longitude_deg);
     count += compare('height', number(Object.entries(values).find(([name]) => /^height above the (areoid|ellipsoid)$/.test(name))?.[1]), own.topography_m);
-    if (own.utc && own.utc !== values.UTC) problems.push(`${title}: UTC is ${values.UTC} on the page and ${own.utc} in the table`);
+    if (own.utc && own.utc !== `${values.UTC}Z`) problems.push(`${title}: UTC is ${values.UTC} on the page and ${own.utc} in the table`);
   }
   for (const one of registered.filter((of) => Number(of.footprint_row) === row)) {
     for (const [name, prefix] of [['kernels', 'before'], ['adjusted', 'adjusted']]) {
@@ -52,7 +52,7 @@ function compared({ title, values }, footprints, registered) {
   return { problems, count };
 }
 
-async function explore(browser, file, view) {
+async function explore(browser, file, view, picture) {
   const context = await browser.newContext({
     viewport: { width: view.width, height: 900 }, colorScheme: view.scheme, hasTouch: view.width < 500,
   });
@@ -65,13 +65,13 @@ async function explore(browser, file, view) {
     if (!/^(file|data):/.test(request.url())) problems.push(`asks for ${request.url()}`);
   });
   await page.goto(`file://${path.resolve(file)}`);
-  const paint = await page.evaluate(() => performance.getEntriesByName('first-contentful-paint')[0]?.startTime);
-  console.log(`look: note: ${file} (${view.name}): first paint after ${Math.round(paint)} ms`);
+  const paint = await page.waitForFunction(() => performance.getEntriesByName('first-contentful-paint')[0]?.startTime);
+  console.log(`look: note: ${file} (${view.name}): first paint after ${Math.round(await paint.jsonValue())} ms`);
   const folder = path.dirname(path.dirname(path.resolve(file)));
   const [footprints, registered] = ['footprints.csv', 'registered_footprints.csv'].map((name) => rowsOf(path.join(folder, name)));
 
   // Every control is reached with the tabulator, in view when it has the focus.
-  const controls = await page.evaluate(() => [...document.querySelectorAll('#map,#strip,#graph,select,button,input:not([hidden])')].map((of) => of.id).filter(Boolean));
+  const controls = await page.evaluate(() => [...document.querySelectorAll('#map,#strip,#graph,select,button,input')].filter((of) => of.offsetParent).map((of) => of.id).filter(Boolean));
   const reached = new Set();
   for (let step = 0; step < 60; step += 1) {
     await page.keyboard.press('Tab');
@@ -114,10 +114,10 @@ async function explore(browser, file, view) {
   // Map: keys pan and zoom; values appear under the pointer.
   await page.focus('#map');
   const pane = () => page.evaluate(() => document.querySelector('#map .leaflet-map-pane').style.transform);
-  const scale = () => page.textContent('#scale-words');
+  const scale = () => page.textContent('#map .leaflet-control-scale-line');
   const start = [await pane(), await scale()];
   await page.keyboard.press('+');
-  await page.waitForFunction((words) => document.getElementById('scale-words').textContent !== words, start[1], { timeout: 2000 })
+  await page.waitForFunction((words) => document.querySelector('#map .leaflet-control-scale-line').textContent !== words, start[1], { timeout: 2000 })
     .catch(() => problems.push('+ does not zoom the map'));
   const zoomed = await pane();
   await page.keyboard.press('ArrowRight');
@@ -134,7 +134,7 @@ async function explore(browser, file, view) {
     for (let row = 1; row < 10 && !found.seen; row += 1) {
       for (let x = 40; x < box.width - 10 && !found.seen; x += 5) {
         await page.mouse.move(box.x + x, box.y + (box.height * row) / 11);
-        if (await page.isVisible('#map + .tip, .map .tip:not([hidden])')) found = { ...await shown(page), seen: true };
+        if (await page.isVisible('.map-part .tip:not([hidden])')) found = { ...await shown(page), seen: true };
       }
     }
     expect(found.seen, 'the map shows no value under the pointer');
@@ -148,13 +148,14 @@ async function explore(browser, file, view) {
     await page.focus('#swipe');
     await page.keyboard.press('ArrowRight');
     expect(await clip() !== old, 'the boundary between pictures does not move');
+    await page.locator('#swipe').scrollIntoViewIfNeeded();
     const thumb = await page.locator('#swipe').boundingBox();
     const [x, y] = [thumb.x + thumb.width / 2, thumb.y + thumb.height / 2];
     await page.mouse.move(x, y);
     await page.mouse.down();
     await page.mouse.move(x - stage.width / 4, y, { steps: 4 });
     await page.mouse.up();
-    expect(Number(await page.inputValue('#swipe')) < 400, 'the boundary cannot be dragged');
+    expect(Number(await page.inputValue('#swipe')) < 400, `the boundary cannot be dragged: ${await page.inputValue('#swipe')}`);
   }
 
   // Image: zoomed in, it shows the pixels of its tiles.
@@ -169,6 +170,7 @@ async function explore(browser, file, view) {
     console.log(`look: note: ${file} (${view.name}): ${largest} pictures of the image in view`);
     await page.click('#strip', { position: { x: 100, y: 100 } });
   }
+  await page.screenshot({ path: picture, fullPage: true });
   const loaded = await page.evaluate(() => [...document.querySelectorAll('img')].every((of) => of.complete && of.naturalWidth > 0));
   expect(loaded, 'a picture of the map is not loaded');
   if (footprints.length) expect(checked > 0, 'no value was compared with the tables');

@@ -13,7 +13,7 @@ pub(super) fn has_places(site: &SiteProducts) -> bool {
     !site.footprints.is_empty() || !site.images.is_empty()
 }
 
-/// A column of whole numbers of 32 bits, little-endian.
+/// A column of whole numbers of 32 bits, little-endian; empty if all are missing.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct Packed {
     /// Number of decimals of a value: 1234 with 2 decimals is 12.34.
@@ -33,9 +33,11 @@ impl Packed {
             )]
             value.map_or(MISSING, |value| (value * scale).round() as i32)
         };
-        let bytes: Vec<u8> = values
-            .flat_map(|value| whole(value).to_le_bytes())
-            .collect();
+        let mut numbers: Vec<i32> = values.map(whole).collect();
+        if numbers.iter().all(|number| *number == MISSING) {
+            numbers.clear();
+        }
+        let bytes: Vec<u8> = numbers.into_iter().flat_map(i32::to_le_bytes).collect();
         Self {
             decimals,
             base64: STANDARD.encode(bytes),

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::{
     columns::{Packed, instants},
     frame::MapFrame,
-    layers::{Layer, LayerPlace, Part, layers},
+    layers::{Layer, LayerPlace, Part, Pixels, layers},
     terrain::{self, TerrainLine},
 };
 use crate::{
@@ -51,6 +51,8 @@ pub(super) struct Data<'a> {
 #[derive(Serialize)]
 struct LayerEntry {
     title: String,
+    /// Whether it lies below the others.
+    below: bool,
     /// On the map.
     edges_m: Option<[f64; 4]>,
     image: Option<usize>,
@@ -68,6 +70,7 @@ impl LayerEntry {
         };
         Self {
             title: layer.title.clone(),
+            below: matches!(layer.pixels, Pixels::Png(_)),
             edges_m,
             image: image.map(|(image, _)| image),
             reduction: image.map(|(_, reduction)| reduction),

@@ -83,7 +83,7 @@ fn body(site: &SiteProducts) -> Markup {
                 Open report/explore.html from the folder of the products." } }
         }
         main {
-            section.map aria-labelledby="map-title" {
+            section.map-part aria-labelledby="map-title" {
                 div.bar {
                     h2 id="map-title" { "Map" }
                     label { "left " select id="left" {} }
@@ -93,25 +93,25 @@ fn body(site: &SiteProducts) -> Markup {
                     div id="map" role="application" aria-label="Map of the site" {}
                     input id="swipe" type="range" min="0" max="1000" value="500" aria-label="Boundary between the left and the right picture";
                 }
-                div.bar { (check("footprints", "footprints", true)) (check("outlines", "outlines of images", true))
+                div.bar { (check("relief", "relief", true)) (check("footprints", "footprints", true)) (check("outlines", "outlines of images", true))
                     (check("ties", "tie points", false)) (check("residuals", "residuals", false))
-                    span id="scale-words" {} }
+                    span id="arrow-words" {} }
                 div.ramp { span id="ramp-low" {} i id="ramp" {} span id="ramp-high" {} }
             }
-            section.strip aria-labelledby="strip-title" {
+            section.image-part aria-labelledby="strip-title" {
                 div.bar {
                     h2 id="strip-title" { "Image" }
                     label { span.hidden { "image " } select id="image" {} }
                 }
                 div.stage { div id="strip" role="application" aria-label="Image with its footprints" {} }
                 div.bar {
-                    (check("before", "before", true))
-                    @if has_adjustment { (check("after", "after the adjustment", true)) }
+                    (check("before", "footprints by the kernels", true))
+                    @if has_adjustment { (check("after", "adjusted", true)) }
                     (check("curve", "elevation profile", true)) (check("measured", "tie points", false))
                 }
                 p.note id="strip-words" {}
             }
-            section.profile aria-labelledby="profile-title" {
+            section.profile-part aria-labelledby="profile-title" {
                 div.bar {
                     h2 id="profile-title" { "Profile" }
                     label { span.hidden { "profile " } select id="profile" {} }
@@ -121,7 +121,7 @@ fn body(site: &SiteProducts) -> Markup {
                 canvas id="graph" tabindex="0" role="slider" aria-label="Footprint along the profile" aria-valuemin="1" aria-valuemax="1" aria-valuenow="1" {}
                 p.note id="profile-words" {}
             }
-            section.values aria-labelledby="values-title" {
+            section.values-part aria-labelledby="values-title" {
                 h2 id="values-title" { "Values" }
                 div id="chosen" role="status" { p { "Point at a footprint or a tie point, or select one along the profile." } }
             }
@@ -134,7 +134,7 @@ fn body(site: &SiteProducts) -> Markup {
 }
 
 fn check(id: &str, words: &str, is_on: bool) -> Markup {
-    html! { label.check { input type="checkbox" id=(id) checked[is_on]; " " (words) } }
+    html! { label.check { input type="checkbox" id=(id) checked[is_on]; i.swatch {} (words) } }
 }
 
 fn keys() -> Markup {

@@ -49,7 +49,7 @@ pub(super) enum LayerPlace {
 pub(super) enum Pixels<'a> {
     /// Brightness, row by row, 0 where there is none; shown as black and as white.
     Grey(Cow<'a, [u8]>, [u8; 2]),
-    /// A complete file.
+    /// A complete file, which lies below other layers of the map.
     Png(Vec<u8>),
 }
 

@@ -1,7 +1,5 @@
 // The parts of the page, and what is chosen in one of them and shown in all.
 
-const plural = (count, what) => `${count} ${what}${count === 1 ? '' : 's'}`;
-
 function shotWords(row) {
   const profile = values.profiles[shots.profile.numbers[row]] ?? 'no profile';
   return `${profile}, record ${shots.record.text(row)}, shot ${shots.shot.text(row)}: ${shots.topography_m.text(row)} m above the ${values.areoid}`;
@@ -92,10 +90,14 @@ function choose(source, chosen) {
 }
 
 byId('ramp').style.background = `linear-gradient(to right,${colours.join()})`;
-byId('ramp-low').textContent = `${heights.low.toFixed(0)} m`;
-byId('ramp-high').textContent = `${heights.high.toFixed(0)} m above the ${values.areoid}; ${
+byId('ramp-low').textContent = `${withMinus(heights.low.toFixed(0))} m`;
+byId('ramp-high').textContent = `${withMinus(heights.high.toFixed(0))} m above the ${values.areoid}; ${
   shots.count < shots.of ? `${shots.count} of ${plural(shots.of, 'footprint')}` : plural(shots.count, 'footprint')}`;
+for (const [id, colour] of [['before', mapBefore], ['after', mapAfter], ['curve', '#ffe14d'], ['measured', '#c84a96'], ['outlines', '#c84a96'], ['ties', '#222']]) {
+  const mark = byId(id)?.parentElement.querySelector('.swatch');
+  if (mark) mark.style.background = colour;
+}
 parts.map = makeMap((chosen) => choose('map', chosen));
 parts.strip = makeStrip((chosen) => choose('strip', chosen));
-parts.graph = makeGraph((chosen) => choose('graph', chosen));
+parts.graph = makeGraph((chosen) => choose('graph', chosen), () => parts.strip.redraw());
 matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => Object.values(parts).forEach((part) => part.redraw()));

@@ -6,7 +6,8 @@ function makeMap(choose) {
   const map = evenMap('map', {});
   const stage = map.getContainer().parentElement;
   const tip = tipIn(stage);
-  const layers = values.layers.filter((layer) => layer.edges_m);
+  const onMap = values.layers.filter((layer) => layer.edges_m);
+  const layers = onMap.filter((layer) => !layer.below);
   const swipe = byId('swipe');
   const divider = document.createElement('div');
   divider.className = 'divider';
@@ -30,8 +31,9 @@ function makeMap(choose) {
   const clip = () => {
     const size = map.getSize();
     const [first, second] = sides.map((of) => of.select.value);
-    swipe.hidden = divider.hidden = first === second || layers.length < 2;
-    const x = swipe.hidden ? size.x : (swipe.value / 1000) * size.x;
+    swipe.hidden = divider.hidden = first === second;
+    // The middle of the handle, which is 32 pixels wide.
+    const x = swipe.hidden ? size.x : 16 + (swipe.value / 1000) * (size.x - 32);
     divider.style.left = `${x}px`;
     const [from, to, middle] = [[0, 0], [size.x, size.y], [x, 0]].map((point) => map.containerPointToLayerPoint(point));
     sides[0].pane.style.clip = `rect(${from.y}px,${middle.x}px,${to.y}px,${from.x}px)`;
@@ -42,13 +44,18 @@ function makeMap(choose) {
     const layer = layers[of.select.value];
     of.shown = layer ? pictureOf(layer, of.side).addTo(map) : null;
   };
-  // The boundary is first between the last two pictures, which show the ground by two images.
-  const first = [Math.max(0, layers.length - 2), layers.length - 1];
+  // The boundary is first between the last two pictures: the ground by two images.
+  const first = [layers.length - 2, layers.length - 1];
   for (const [at, of] of sides.entries()) {
     of.select.append(...layers.map((layer, index) => new Option(layer.title, index)), new Option('no picture', ''));
-    of.select.value = layers.length ? first[at] : '';
+    of.select.value = layers[first[at]] ? first[at] : '';
+    of.select.parentElement.hidden = layers.length === 0;
     of.select.addEventListener('change', () => { dress(of); clip(); });
   }
+
+  const ground = L.layerGroup(onMap.filter((layer) => layer.below).map((layer) => pictureOf(layer, 'ground')));
+  map.createPane('ground').style.zIndex = 100;
+  byId('relief').addEventListener('change', (event) => (event.target.checked ? ground.addTo(map) : ground.remove()));
 
   // What is drawn on them.
   const toggles = Object.fromEntries(['footprints', 'outlines', 'ties', 'residuals'].map((id) => [id, byId(id)]));
@@ -67,19 +74,16 @@ function makeMap(choose) {
     toggle.addEventListener('change', () => { drawing.soon(); words(); });
   }
 
-  // Scale: metres of a round length, and the magnification of residuals.
+  // The images of the arrows, and their magnification.
   const words = () => {
-    const metres = 100 / 2 ** map.getZoom();
-    const decade = 10 ** Math.floor(Math.log10(metres));
-    const round = [5, 2, 1].map((lead) => lead * decade).find((length) => length <= metres);
-    const width = Math.round((round / metres) * 100);
-    const length = round >= 1000 ? `${round / 1000} km` : `${round} m`;
-    const magnified = toggles.residuals.checked && arrows.times > 0 ? `; residuals × ${arrows.times}` : '';
-    byId('scale-words').textContent = `${width} pixels are ${length}${magnified}`;
+    const arrowWords = byId('arrow-words');
+    arrowWords.replaceChildren();
+    if (!toggles.residuals.checked) return;
+    arrowWords.append(arrows.times > 0 ? `residuals × ${arrows.times}: ` : 'no residuals');
+    if (arrows.times > 0) for (const [index, { id }] of values.images.entries()) arrowWords.append(swatch(arrowColour(index)), `${id} `);
   };
 
   map.on('move zoom resize', clip);
-  map.on('zoomend resize', words);
   swipe.addEventListener('input', clip);
 
   const found = ({ latlng }, reach) => {
@@ -98,12 +102,12 @@ function makeMap(choose) {
   map.on('click', (event) => point(event, 16));
   map.on('mouseout', () => tip.hide());
 
-  const all = boundsOfAll(layers);
-  map.fitBounds(all, { padding: [8, 8] });
+  map.fitBounds(boundsOfAll(onMap), { padding: [8, 8] });
+  L.control.scale({ imperial: false }).addTo(map);
+  ground.addTo(map);
   sides.forEach(dress);
   drawing.addTo(map);
   clip();
-  words();
   return {
     show({ shot = -1, tie = -1 }, isRemote) {
       Object.assign(state, { shot, tie });
@@ -135,7 +139,7 @@ function boundsOfAll(layers) {
 }
 
 function drawOutlines({ context, x, y }) {
-  for (const { id, outline_deg: outline } of values.images) {
+  for (const [index, { id, outline_deg: outline }] of values.images.entries()) {
     if (!outline.length) continue;
     const places = outline.map((corner) => placeOf(...corner));
     for (const [width, colour] of [[4, '#fff'], [2, '#c84a96']]) {
@@ -147,8 +151,18 @@ function drawOutlines({ context, x, y }) {
       context.stroke();
     }
     const top = places.reduce((best, place) => (place[1] > best[1] ? place : best));
-    label(context, id, x(top[0]) + 4, y(top[1]) - 4);
+    const low = places.reduce((best, place) => (place[1] < best[1] ? place : best));
+    // The images of a pair begin and end together.
+    if (index % 2) label(context, id, x(low[0]) + 4, y(low[1]) + 16);
+    else label(context, id, x(top[0]) + 4, y(top[1]) - 6);
   }
+}
+
+function swatch(colour) {
+  const mark = document.createElement('i');
+  mark.className = 'swatch';
+  mark.style.background = colour;
+  return mark;
 }
 
 function label(context, words, x, y) {
@@ -160,19 +174,19 @@ function label(context, words, x, y) {
   context.fillText(words, x, y);
 }
 
-// Squares by height, larger where footprints are far apart.
+// Squares by height with a dark edge, larger where footprints are far apart.
 function drawFootprints({ context, x, y, scale, view }) {
-  const side = Math.min(9, Math.max(2, scale * 60));
-  const edge = side >= 5;
+  const half = Math.min(4.5, Math.max(1.5, scale * 30));
   const steps = Array.from({ length: colourSteps }, () => []);
   shots.nearest.within(view.west, view.south, view.east, view.north, (row) => steps[shots.steps[row]].push(row));
+  const squares = (rows, side) => {
+    for (const row of rows) context.fillRect(x(shots.x[row]) - side, y(shots.y[row]) - side, 2 * side, 2 * side);
+  };
+  context.fillStyle = '#000';
+  for (const rows of steps) squares(rows, half + 1);
   for (const [step, rows] of steps.entries()) {
-    context.fillStyle = edge ? '#000' : colours[step];
-    const half = side / 2 + (edge ? 1 : 0);
-    for (const row of rows) context.fillRect(x(shots.x[row]) - half, y(shots.y[row]) - half, 2 * half, 2 * half);
-    if (!edge) continue;
     context.fillStyle = colours[step];
-    for (const row of rows) context.fillRect(x(shots.x[row]) - side / 2, y(shots.y[row]) - side / 2, side, side);
+    squares(rows, half);
   }
 }
 
@@ -190,6 +204,9 @@ function drawTies({ context, x, y, view }) {
   }
 }
 
+const arrowColours = ['#018dff', '#ff610d', '#47a475', '#c84a96', '#452e00', '#c10019'];
+const arrowColour = (index) => arrowColours[index % arrowColours.length];
+
 // Residuals of tie points as arrows on the ground, by image; the longest is a thirtieth of the longest image.
 function arrowsOf() {
   const { tie, image, residual_east_m: east, residual_north_m: north } = measures;
@@ -205,10 +222,9 @@ function arrowsOf() {
   const decade = 10 ** Math.floor(Math.log10(largest || 1));
   const times = largest > 0 ? [5, 2, 1].map((lead) => lead * decade).find((lead) => lead <= largest) : 0;
   const draw = ({ context, x, y, view }) => {
-    const ink = ['#018dff', '#ff610d', '#47a475', '#c84a96', '#452e00', '#c10019'];
     for (const index of values.images.keys()) {
       context.lineWidth = 1.5;
-      context.strokeStyle = ink[index % ink.length];
+      context.strokeStyle = arrowColour(index);
       context.beginPath();
       for (let row = 0; row < tie.length; row += 1) {
         if (image.numbers[row] !== index || !east.has(row)) continue;

@@ -4,7 +4,7 @@
 const corridorM = 500;
 const margins = { left: 62, right: 12, top: 12, bottom: 40 };
 
-function makeGraph(choose) {
+function makeGraph(choose, onProfile) {
   const canvas = byId('graph');
   const select = byId('profile');
   const tip = tipIn(canvas.parentElement);
@@ -54,6 +54,8 @@ function makeGraph(choose) {
     shown = profileOf(profile);
     [state.from, state.to] = [0, Math.max(shown.km.at(-1), 0.1)];
     select.value = profile;
+    current.profile = profile;
+    onProfile();
     canvas.setAttribute('aria-valuemax', shown.rows.length);
     byId('profile-words').textContent = shown.words;
     soon();
@@ -225,7 +227,7 @@ function roundSteps(low, high, most) {
   const step = [1, 2, 5, 10].map((lead) => lead * decade).find((lead) => lead >= rough);
   const decimals = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
   const steps = [];
-  for (let at = Math.ceil(low / step); at * step <= high; at += 1) steps.push([at * step, (at * step).toFixed(decimals)]);
+  for (let at = Math.ceil(low / step); at * step <= high; at += 1) steps.push([at * step, withMinus((at * step).toFixed(decimals))]);
   return steps;
 }
 

@@ -2,8 +2,9 @@
 
 // Footprints with a pause of more seconds between them are not joined.
 const pauseS = 2;
-// The elevation profile takes this share of the width of the image.
+// The elevation profile takes this share of the width of the image. Of more profiles, only that of the graph is drawn.
 const curveShare = 0.25;
+const curvesDrawn = 3;
 
 function makeStrip(choose) {
   const select = byId('image');
@@ -126,30 +127,33 @@ function stripOf(of) {
     layer: values.layers.find((layer) => layer.image === of.image),
     measures: { rows, x, y, nearest: new Nearest(x, y) },
     measureOf: (tie) => placeOfTie.get(tie),
-    curves: curvesOf(of, latest, samples),
+    elevation: curvesOf(of, latest, samples),
   };
 }
 
-// The elevation profiles of the footprints of an image, beside their tracks.
+// The elevation profiles of the footprints of an image, beside their tracks, on one scale.
 function curvesOf(of, latest, samples) {
+  const shotOf = (row) => of.footprint.numbers[row];
+  const ground = (row) => shots.topography_m.at(shotOf(row));
   const byProfile = new Map();
+  let [low, high] = [Infinity, -Infinity];
   for (const row of latest.rows) {
-    const profile = shots.profile.numbers[of.footprint.numbers[row]];
+    const profile = shots.profile.numbers[shotOf(row)];
     if (!byProfile.has(profile)) byProfile.set(profile, []);
     byProfile.get(profile).push(row);
+    [low, high] = [Math.min(low, ground(row)), Math.max(high, ground(row))];
   }
-  return [...byProfile.values()].map((rows) => {
-    const ground = rows.map((row) => shots.topography_m.at(of.footprint.numbers[row]));
-    const [low, high] = [Math.min(...ground), Math.max(...ground)];
+  const curves = [...byProfile].map(([profile, rows]) => {
     const mean = rows.reduce((sum, row) => sum + latest.sample[row], 0) / rows.length;
     const away = (mean > samples / 2 ? -1 : 1) * curveShare * samples;
-    const points = rows.map((row, at) => ({
-      instant: Number(shots.instants[of.footprint.numbers[row]]) / 1e6,
+    const points = rows.map((row) => ({
+      instant: Number(shots.instants[shotOf(row)]) / 1e6,
       track: [latest.sample[row], -latest.line[row]],
-      curve: [latest.sample[row] + away * (0.1 + (0.9 * (ground[at] - low)) / Math.max(high - low, 0.01)), -latest.line[row]],
+      curve: [latest.sample[row] + (away * (ground(row) - low)) / Math.max(high - low, 0.01), -latest.line[row]],
     }));
-    return { low, high, points };
+    return { profile, points };
   });
+  return { low, high, curves };
 }
 
 function drawFrame({ context, x, y, scale }, { lines, samples }) {
@@ -182,8 +186,9 @@ function drawPlaces({ context, x, y, scale, view }, { x: samples, y: lines }, co
   }
 }
 
-function drawCurves({ context, x, y }, { curves }) {
-  for (const { points } of curves) {
+function drawCurves({ context, x, y }, { elevation: { curves } }) {
+  for (const { profile, points } of curves) {
+    if (curves.length > curvesDrawn && profile !== current.profile) continue;
     for (const [width, colour, name] of [[1, '#fff', 'track'], [5, '#000', 'curve'], [2.5, '#ffe14d', 'curve']]) {
       context.lineWidth = width;
       context.strokeStyle = colour;
@@ -215,11 +220,14 @@ function drawMeasures({ context, x, y, view }, { measures: { x: samples, y: line
   }
 }
 
-function stripWords({ id, lines, samples, before, after, curves, layer }) {
+function stripWords({ id, lines, samples, before, after, elevation: { low, high, curves }, layer }) {
   const parts = [`${id}: ${lines} lines of ${samples} samples`];
-  parts.push(`${before.rows.length} footprints inside before${ties.adjusted ? `, ${after.rows.length} after the adjustment` : ''}`);
-  const ends = curves.map(({ low, high }) => `${low.toFixed(0)} to ${high.toFixed(0)} m`);
-  if (ends.length) parts.push(`the yellow curve shows heights above the ${values.areoid}, ${[...new Set(ends)].join('; ')}, across a quarter of the image`);
+  parts.push(`${plural(before.rows.length, 'footprint')} inside by the kernels${ties.adjusted ? `, ${after.rows.length} after the adjustment` : ''}`);
+  if (curves.length) {
+    const which = curves.length > curvesDrawn ? 'of the profile in the graph' : 'along the track';
+    const [from, to] = [low, high].map((height) => withMinus(height.toFixed(0)));
+    parts.push(`yellow: heights ${which}, ${from} m above the ${values.areoid} on the track and ${to} m a quarter of the image beside it`);
+  }
   if (!layer) parts.push('the site has no pixels of this image');
   else if (layer.reduction > 1) parts.push(`one pixel of the picture is ${layer.reduction} × ${layer.reduction} pixels of the image`);
   return `${parts.join('; ')}.`;

@@ -2,6 +2,10 @@
 const values = JSON.parse(document.getElementById('values').textContent);
 const missing = -2147483648;
 const byId = (id) => document.getElementById(id);
+const withMinus = (text) => text.replace('-', '−');
+const plural = (count, what) => `${count} ${what}${count === 1 ? '' : 's'}`;
+// The profile of the graph, which other parts also mark.
+const current = { profile: -1 };
 
 function bytesOf(base64) {
   const text = atob(base64);
@@ -20,7 +24,8 @@ class Column {
 
   get length() { return this.numbers.length; }
 
-  has(row) { return this.numbers[row] !== missing; }
+  // A column without any value is empty.
+  has(row) { return row < this.numbers.length && this.numbers[row] !== missing; }
 
   // NaN where the value is missing.
   at(row) { return this.has(row) ? this.numbers[row] / this.scale : NaN; }
