@@ -23,6 +23,32 @@ const drawn = (page, part) => page.evaluate(async (selector) => {
   return canvas ? canvas.toDataURL() : '';
 }, part);
 
+// The middle of the ring that marks what is chosen, or null where the part does not show it.
+const marked = (page, part) => page.evaluate((selector) => {
+  const canvas = document.querySelector(`${selector} canvas`);
+  const { width, height } = canvas;
+  const pixels = canvas.getContext('2d').getImageData(0, 0, width, height).data;
+  let [left, right, top, bottom] = [Infinity, -Infinity, Infinity, -Infinity];
+  for (let at = 0; at < pixels.length; at += 4) {
+    if (pixels[at] !== 193 || pixels[at + 1] !== 0 || pixels[at + 2] !== 25) continue;
+    const [x, y] = [(at / 4) % width, Math.floor(at / 4 / width)];
+    [left, right, top, bottom] = [Math.min(left, x), Math.max(right, x), Math.min(top, y), Math.max(bottom, y)];
+  }
+  const ratio = width / canvas.clientWidth;
+  return left > right ? null : { x: (left + right) / 2 / ratio, y: (top + bottom) / 2 / ratio };
+}, part);
+
+// Points at what is marked: the value there.
+async function pointed(page, part, section) {
+  await page.locator(part).scrollIntoViewIfNeeded();
+  await drawn(page, `${part} canvas`);
+  const place = await marked(page, part);
+  if (!place) return null;
+  const box = await page.locator(part).boundingBox();
+  await page.mouse.move(box.x + place.x, box.y + place.y);
+  return await page.isVisible(`${section} .tip:not([hidden])`) ? shown(page) : { title: '', values: {} };
+}
+
 // Values of a footprint against the tables: numbers within half of their last digit.
 function compared({ title, values }, footprints, registered) {
   const row = Number(title.match(/^Footprint (\d+)$/)?.[1]);
@@ -104,14 +130,30 @@ async function explore(browser, file, view, picture) {
     const hovered = await shown(page);
     check(hovered);
     expect(/^(Footprint|Tie point)/.test(hovered.title), 'the profile shows no value under the pointer');
-    if (registered.length) {
-      // A footprint of an image, by the profile: the image marks it.
-      const inside = await page.evaluate(() => document.querySelectorAll('#image option').length > 0);
-      expect(inside, 'no image is offered');
+    const onMap = await pointed(page, '#map', '.map-part');
+    expect(/^(Footprint|Tie point)/.test(onMap?.title), 'the map shows no value under the pointer');
+    if (onMap) check(onMap);
+    // A footprint of the first image: the image marks it, and has its values under the pointer.
+    const image = await page.evaluate(() => document.querySelector('#image option')?.textContent);
+    const inside = registered.find((of) => of.image === image && (of.adjusted_inside === 'true' || !of.adjusted_line));
+    if (inside) {
+      await page.evaluate((id) => {
+        const select = document.getElementById('profile');
+        select.value = [...select.options].find((option) => option.textContent === id).value;
+        select.dispatchEvent(new Event('change'));
+      }, inside.profile);
+      await page.focus('#graph');
+      await page.keyboard.press('Home');
+      for (let step = 0; step < 500 && !Object.keys((await shown(page)).values).some((name) => name.startsWith(image)); step += 1) {
+        await page.keyboard.press('ArrowRight');
+      }
+      const onImage = await pointed(page, '#strip', '.image-part');
+      expect(/^(Footprint|Tie point)/.test(onImage?.title), 'the image does not mark the footprint of the profile');
+      if (onImage) check(onImage);
     }
   }
 
-  // Map: keys pan and zoom; values appear under the pointer.
+  // Map: keys pan and zoom.
   await page.focus('#map');
   const pane = () => page.evaluate(() => document.querySelector('#map .leaflet-map-pane').style.transform);
   const scale = () => page.textContent('#map .leaflet-control-scale-line');
@@ -126,20 +168,6 @@ async function explore(browser, file, view, picture) {
   await page.keyboard.press('-');
   await page.waitForTimeout(400);
   const stage = await page.locator('#map').boundingBox();
-  let found = { title: '' };
-  if (footprints.length) {
-    // Some line across the map meets a track of footprints.
-    await page.locator('#map').scrollIntoViewIfNeeded();
-    const box = await page.locator('#map').boundingBox();
-    for (let row = 1; row < 10 && !found.seen; row += 1) {
-      for (let x = 40; x < box.width - 10 && !found.seen; x += 5) {
-        await page.mouse.move(box.x + x, box.y + (box.height * row) / 11);
-        if (await page.isVisible('.map-part .tip:not([hidden])')) found = { ...await shown(page), seen: true };
-      }
-    }
-    expect(found.seen, 'the map shows no value under the pointer');
-    check(found);
-  }
 
   // Boundary between two pictures.
   if (await page.isVisible('#swipe')) {

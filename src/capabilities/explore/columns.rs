@@ -62,7 +62,10 @@ mod tests {
 
     #[test]
     fn values_are_rounded_once_and_missing_ones_are_marked() {
-        let packed = Packed::of(2, [Some(-1.005e3), Some(0.126), None, Some(f64::NAN)].into_iter());
+        let packed = Packed::of(
+            2,
+            [Some(-1.005e3), Some(0.126), None, Some(f64::NAN)].into_iter(),
+        );
         let bytes = STANDARD.decode(packed.base64).unwrap();
         let numbers: Vec<i32> = bytes
             .chunks_exact(4)

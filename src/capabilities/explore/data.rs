@@ -154,7 +154,10 @@ impl<'a> Data<'a> {
     /// An output that cannot be read; a picture that the library rejects.
     pub(super) fn of(site: &'a SiteProducts<'a>) -> Result<Self> {
         let terms = site.config.terms();
-        let registered = registered_footprints(site);
+        let registered = match site.footprints.is_empty() {
+            true => Vec::new(),
+            false => registered_footprints(site),
+        };
         let kept = kept(site, &registered);
         let (footprints, profiles) = footprints(site, &kept);
         let (ties, measures) = ties(site);
@@ -207,10 +210,7 @@ fn kept(site: &SiteProducts, registered: &[RegisteredFootprint]) -> BTreeMap<usi
 }
 
 /// The footprints, and the rows of each profile. A footprint in several windows has the first of its profiles.
-fn footprints(
-    site: &SiteProducts,
-    kept: &BTreeMap<usize, usize>,
-) -> (Footprints, Vec<Vec<usize>>) {
+fn footprints(site: &SiteProducts, kept: &BTreeMap<usize, usize>) -> (Footprints, Vec<Vec<usize>>) {
     let of = site.footprints;
     let mut profile = vec![usize::MAX; of.len()];
     for (index, one) in site.profiles.iter().enumerate().rev() {
@@ -264,14 +264,15 @@ fn by_image(
         let is_inside = |of: &RegisteredFootprint, round: usize| {
             u32::from(of.places[round].is_some_and(|place| place.inside))
         };
-        let sigma_m = |axis: usize| {
-            Packed::of(2, own().map(|of| Some(of.adjusted?.local_sigmas_m()[axis])))
-        };
+        let sigma_m =
+            |axis: usize| Packed::of(2, own().map(|of| Some(of.adjusted?.local_sigmas_m()[axis])));
         Registered {
             image: index,
             footprint: Packed::whole(own().map(|of| {
                 let place = kept.get(&of.footprint).copied();
-                place.and_then(|at| u32::try_from(at).ok()).unwrap_or(u32::MAX)
+                place
+                    .and_then(|at| u32::try_from(at).ok())
+                    .unwrap_or(u32::MAX)
             })),
             before_line: place(0, |of| of.line),
             before_sample: place(0, |of| of.sample),

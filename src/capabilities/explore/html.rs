@@ -66,8 +66,14 @@ pub(super) fn page(site: &SiteProducts) -> Result<(String, u64)> {
 /// The script of the page.
 fn script() -> String {
     // The map of Leaflet's source is not part of the page.
-    let leaflet = LEAFLET.split("//# sourceMappingURL").next().unwrap_or_default();
-    format!("{leaflet}\n(() => {{\n'use strict';\n{}}})();\n", SCRIPTS.concat())
+    let leaflet = LEAFLET
+        .split("//# sourceMappingURL")
+        .next()
+        .unwrap_or_default();
+    format!(
+        "{leaflet}\n(() => {{\n'use strict';\n{}}})();\n",
+        SCRIPTS.concat()
+    )
 }
 
 fn body(site: &SiteProducts) -> Markup {
@@ -139,11 +145,20 @@ fn check(id: &str, words: &str, is_on: bool) -> Markup {
 
 fn keys() -> Markup {
     let keys = [
-        ("arrow keys", "pan the map or the image; on the profile, go to the next footprint"),
-        ("+ and −", "zoom the map or the image; lengthen or shorten the profile"),
+        (
+            "arrow keys",
+            "pan the map or the image; on the profile, go to the next footprint",
+        ),
+        (
+            "+ and −",
+            "zoom the map or the image; lengthen or shorten the profile",
+        ),
         ("Home and End", "first and last footprint of the profile"),
         ("Page Up and Page Down", "ten footprints along the profile"),
-        ("arrow keys on the boundary", "move the boundary between the two pictures"),
+        (
+            "arrow keys on the boundary",
+            "move the boundary between the two pictures",
+        ),
     ];
     html! { dl.keys-of-page { @for (key, words) in keys { div { dt { (key) } dd { (words) } } } } }
 }

@@ -184,7 +184,9 @@ fn shaded(grid: &HeightGrid) -> Vec<u8> {
         })
         .collect();
     let known = || slopes.iter().flatten();
-    let squares: f64 = known().map(|[east, south]| east * east + south * south).sum();
+    let squares: f64 = known()
+        .map(|[east, south]| east * east + south * south)
+        .sum();
     let slope = (squares / known().count().max(1) as f64).sqrt();
     let times = (SLOPE / slope.max(f64::MIN_POSITIVE)).clamp(1.0, EXAGGERATION_MAX);
     let times = round_length_m(times);
@@ -210,7 +212,10 @@ fn orthoimage<'a>(site: &SiteProducts, frame: &MapFrame, of: &'a Orthoimage) -> 
         name: format!("{id}_orthoimage"),
         title: format!("Orthoimage of {id}"),
         place: LayerPlace::Map(edges_m(frame, &of.account.map)),
-        pixels: Pixels::Grey(of.brightness.as_slice().into(), stretch(&of.account.look.brightness)),
+        pixels: Pixels::Grey(
+            of.brightness.as_slice().into(),
+            stretch(&of.account.look.brightness),
+        ),
         size: of.account.map.size,
     }
 }
@@ -276,7 +281,10 @@ mod tests {
         let parts = layer(size, &pixels).parts();
         let files: Vec<&str> = parts.iter().map(|part| &*part.file).collect();
         assert_eq!(files, ["a.png", "a_0_0.png", "a_1_1.png"]);
-        assert_eq!((parts[2].rows, parts[2].columns), ([TILE, size[0]], [TILE, size[1]]));
+        assert_eq!(
+            (parts[2].rows, parts[2].columns),
+            ([TILE, size[0]], [TILE, size[1]])
+        );
         assert_eq!(parts[0].step, 3);
         assert_eq!(layer([2, 2], &[0; 4]).parts().len(), 1);
     }

@@ -21,8 +21,8 @@ use super::Capability;
 use crate::{
     error::{Locate as _, Result},
     products::{
-        Content, Context, Declaration, Product, Role, Write, Written,
-        error::ProductError, read_bytes, write_bytes,
+        Content, Context, Declaration, Product, Role, Write, Written, error::ProductError,
+        read_bytes, write_bytes,
     },
     report::{Section, parts::link},
 };

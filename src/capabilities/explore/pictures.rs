@@ -95,7 +95,9 @@ mod tests {
             step: 2,
         };
         let file = layer.png(&part).unwrap();
-        let mut reader = png::Decoder::new(std::io::Cursor::new(file)).read_info().unwrap();
+        let mut reader = png::Decoder::new(std::io::Cursor::new(file))
+            .read_info()
+            .unwrap();
         assert_eq!(reader.info().trns.as_deref(), Some(&[0, 0][..]));
         let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
         reader.next_frame(&mut pixels).unwrap();

@@ -4,11 +4,8 @@ use serde::Serialize;
 
 use super::columns::Packed;
 use crate::{
-    error::Result,
-    geom::height_grid::HeightGrid,
-    products::SiteProducts,
-    stages::map_surface::Surface,
-    units::wrap_pi,
+    error::Result, geom::height_grid::HeightGrid, products::SiteProducts,
+    stages::map_surface::Surface, units::wrap_pi,
 };
 
 /// Samples of the terrain model from one footprint to the next: 40 m where footprints are 300 m apart.

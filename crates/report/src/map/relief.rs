@@ -270,9 +270,10 @@ pub fn relief_of_shots(shots: &[((f64, f64), f64)]) -> Result<Option<(Vec<u8>, [
         return Ok(None);
     };
     let heights_m = shots.iter().map(|(_, height_m)| *height_m);
-    let range = heights_m.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), height_m| {
-        (low.min(height_m), high.max(height_m))
-    });
+    let range = heights_m.fold(
+        (f64::INFINITY, f64::NEG_INFINITY),
+        |(low, high), height_m| (low.min(height_m), high.max(height_m)),
+    );
     let edges_m = [view.west_m, view.south_m, view.east_m, view.north_m];
     Ok(Some((relief.png(range)?, edges_m)))
 }
