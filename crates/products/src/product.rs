@@ -297,9 +297,10 @@ impl Declaration {
                 return format!("a site with footprints, format `{}`", format.word());
             }
             Write::Site(_) => "every site",
-            Write::Many { files: when, .. } => when,
             Write::Image(_) => "every image",
-            Write::Where { sites: when, .. } | Write::ImageWhere { images: when, .. } => when,
+            Write::Where { sites: when, .. }
+            | Write::ImageWhere { images: when, .. }
+            | Write::Many { files: when, .. } => when,
             Write::Ties(_) => "a site with tie points",
             Write::Matched(_) => "a site with matched tie points",
             Write::Adjustment(_) | Write::Several(_) => "a site with an adjustment",

@@ -154,9 +154,10 @@ impl<'a> Data<'a> {
     /// An output that cannot be read; a picture that the library rejects.
     pub(super) fn of(site: &'a SiteProducts<'a>) -> Result<Self> {
         let terms = site.config.terms();
-        let registered = match site.footprints.is_empty() {
-            true => Vec::new(),
-            false => registered_footprints(site),
+        let registered = if site.footprints.is_empty() {
+            Vec::new()
+        } else {
+            registered_footprints(site)
         };
         let kept = kept(site, &registered);
         let (footprints, profiles) = footprints(site, &kept);
