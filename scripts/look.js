@@ -2,6 +2,7 @@
 const fs = require('fs');
 const path = require('path');
 const { chromium } = require('playwright-core');
+const { explore } = require('./look-explore.js');
 
 const [chromiumPath, pictures, ...pages] = process.argv.slice(2);
 const axe = fs.readFileSync(require.resolve('axe-core/axe.min.js'), 'utf8');
@@ -30,6 +31,8 @@ function overprints() {
   return pairs;
 }
 
+const nameOf = (file) => path.resolve(file).split(path.sep).slice(-3).filter(Boolean).join('-').replace(/\.html$/, '');
+
 async function look(browser, file, view) {
   const context = await browser.newContext({
     viewport: { width: view.width, height: 900 },
@@ -52,7 +55,7 @@ async function look(browser, file, view) {
   if (wide > view.width) problems.push(`scrolls sideways: ${wide} of ${view.width} pixels`);
   const overprinted = await page.evaluate(overprints);
   for (const pair of overprinted) problems.push(`labels lie on each other: ${pair}`);
-  const name = path.resolve(file).split(path.sep).slice(-3).filter(Boolean).join('-').replace(/\.html$/, '');
+  const name = nameOf(file);
   await page.screenshot({ path: path.join(pictures, `${name}-${view.name}.png`), fullPage: true });
   // Paper, once a page.
   if (view.scheme === 'light' && view.width > 1000) {
@@ -81,6 +84,10 @@ async function look(browser, file, view) {
     for (const view of views) {
       // A page that crashes the browser is a problem of that page.
       const problems = await look(browser, file, view).catch((error) => [error.message]);
+      if (path.basename(file) === 'explore.html') {
+        const picture = path.join(pictures, `${nameOf(file)}-${view.name}-used.png`);
+        problems.push(...await explore(browser, file, view, picture).catch((error) => [error.message]));
+      }
       for (const problem of problems) {
         failed = true;
         console.error(`look: ${file} (${view.name}): ${problem}`);

@@ -5,6 +5,7 @@
 //! files, catalogue, documentation, page and verdict follow. The flow (`flow/site.rs`) calls its stage. Stages that
 //! many products use have these in the crates `products`, `report` and `stages/judge`.
 
+mod explore;
 mod orthoimages;
 mod spacing;
 mod terrain;
@@ -40,6 +41,7 @@ static CAPABILITIES: &[&Capability] = &[
     &terrain::CAPABILITY,
     &orthoimages::CAPABILITY,
     &spacing::CAPABILITY,
+    &explore::CAPABILITY,
 ];
 
 /// All products that a site may have, in the order in which they are written.

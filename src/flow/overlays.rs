@@ -11,7 +11,7 @@ use crate::{
     stage::{Round, Stage as _},
     stages::{
         image_pixels::PixelFiles,
-        lay_overlays::{LayOverlays, MeasuredTies},
+        lay_overlays::{LayOverlays, MeasuredTies, Overlays},
     },
 };
 
@@ -49,5 +49,6 @@ pub(super) fn overlays<D: Driver>(flow: &mut D, config: &SiteConfig, site: &mut 
             adjusted,
         }),
     })?;
-    Ok(site.book.enter(Round::Initial, overlays)?)
+    let shown = Overlays::without_views;
+    Ok(site.book.enter_heavy(Round::Initial, overlays, shown)?)
 }

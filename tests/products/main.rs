@@ -7,6 +7,7 @@ mod config_arbitrary;
 mod config_bad;
 mod config_valid;
 mod exchange_readers;
+mod explore;
 mod fidelity;
 mod generated;
 mod methods;

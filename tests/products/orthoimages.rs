@@ -41,7 +41,7 @@ fn map(size: [usize; 2], cell_m: f64) -> HeightGrid {
     }
 }
 
-fn surface() -> Surface {
+pub(crate) fn surface() -> Surface {
     let heights = HeightGrid {
         heights_m: (0..12_u8).map(f32::from).collect(),
         ..map(TERRAIN, 10.0)
@@ -85,7 +85,7 @@ fn surface() -> Surface {
 }
 
 /// Brightness 0 (empty) to 47; no jitter was measured.
-fn orthoimage() -> Orthoimage {
+pub(crate) fn orthoimage() -> Orthoimage {
     let brightness: Vec<u8> = (0..48).collect();
     Orthoimage {
         account: OrthoimageAccount {
@@ -113,7 +113,7 @@ fn orthoimage() -> Orthoimage {
     }
 }
 
-fn output<T>(value: T) -> Output<T> {
+pub(crate) fn output<T>(value: T) -> Output<T> {
     let nowhere = Provenance {
         blake3: String::new(),
         fingerprint: String::new(),

@@ -159,6 +159,8 @@ fn every_product_is_there_with_its_rows() {
         ("exchange/centre/m04-02852_isd.json", 40),
         ("registered_footprints.parquet", 32),
         ("registered_footprints.csv", 32),
+        ("report/explore.html", 60),
+        ("report/explore/relief.png", 0),
         ("report/index.html", 0),
         ("report/page.postcard", 0),
         ("kernels.tm", 0),

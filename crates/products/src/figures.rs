@@ -25,7 +25,10 @@ pub(super) static FIGURE: Declaration = Declaration {
     rows: "",
     role: Role::Overview,
     content: Content::Foreign,
-    write: Write::OfPage(write),
+    write: Write::Many {
+        files: "every figure of the report",
+        write,
+    },
     uses: &[],
 };
 

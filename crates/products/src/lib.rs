@@ -77,7 +77,7 @@ pub use archive::{
 pub use calibration::{CalibrationProducts, write_calibration_products};
 pub use exchange::{
     ContourLayer, ControlMeasure, ControlNetwork, ControlPoint, GroundEstimate, ImageMeasure,
-    LidarPoint, NetworkMeasure, NetworkPoint, ProfileShift, write_binary_network, write_contours,
+    LidarPoint, NetworkMeasure, NetworkPoint, ProfileShift, on_ground_m, tie_residuals, write_binary_network, write_contours,
     write_control_network, write_gcp, write_lidar_data,
 };
 pub use files::{read_bytes, write_bytes, write_json};
@@ -94,8 +94,10 @@ pub use page_data::{PAGE_DATA, PageData};
 pub use picture::{PictureFile, PictureFormat, PictureHead};
 pub use product::{
     Content, Context, Declaration, Pages, Product, Program as ReadingProgram, Role, Use, Write,
+    Written,
 };
 pub use raster_label::Label;
+pub use registered_footprints::{Place, RegisteredFootprint, registered_footprints};
 pub use registry::declarations;
 pub use rows_file::{Out, RowsFormat, RowsWriter, SQL};
 #[cfg(feature = "sql")]
@@ -110,7 +112,7 @@ use rayon::prelude::*;
 
 use areograph_base::error::{Locate, Result};
 use areograph_config::ShotFormat;
-use product::{Scope, Written};
+use product::Scope;
 
 /// Writes those of `declarations` that `site` has below `directory`, with `pages` (or one page as its report), and reads
 /// each of them back.
@@ -238,7 +240,7 @@ fn write(
     let path = of.directory.join(&relative);
     let rows = match (&declaration.write, image, &of.site.geometric) {
         (Write::Site(write), ..) => write(&path, of),
-        (Write::OfPage(write), ..) => return write(of),
+        (Write::Many { write, .. }, ..) => return write(of),
         (Write::Footprints(format, write), ..) if of.site.has_footprints_in(*format) => {
             write(&path, of).map(Some)
         }

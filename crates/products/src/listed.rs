@@ -3,14 +3,13 @@
 use super::{
     adjusted_kernels,
     exchange::{adjusted::LIDAR, stac::ITEM},
-    figures::FIGURE,
     page::OVERLAYS,
     product::{Declaration, Write},
     site::{Listed, SiteProducts},
 };
 use areograph_stages::adjust::PointKind;
 
-/// Those of `declarations` that `site` has, in the order in which they are written, without the figures of its report.
+/// Those of `declarations` that `site` has, in the order in which they are written, without files of which there are many.
 #[must_use]
 pub fn listed(site: &SiteProducts, declarations: &[&'static Declaration]) -> Vec<Listed> {
     let terms = site.config.terms();
@@ -57,7 +56,7 @@ fn has(site: &SiteProducts, declaration: &Declaration) -> bool {
         Write::Matched(_) => site
             .geometric
             .is_some_and(|geometric| !geometric.ties.matched.is_empty()),
-        Write::OfPage(_) => declaration.path != FIGURE.path,
+        Write::Many { .. } => false,
         Write::Footprints(format, _) => site.has_footprints_in(format),
         Write::Ties(_) => site.geometric.is_some(),
         Write::Adjustment(_) | Write::AdjustedImage(_) | Write::WithAnother | Write::Several(_) => {

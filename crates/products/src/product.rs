@@ -183,8 +183,13 @@ pub enum Write {
     AdjustedImage(fn(&Path, &Context, &ImageProducts) -> Result<u64>),
     /// For every image of a site with an adjustment, by the product that writes several.
     WithAnother,
-    /// For every site, as many as its report has.
-    OfPage(fn(&Context) -> Result<Vec<Written>>),
+    /// As many as there are of something.
+    Many {
+        /// Of these, in words.
+        files: &'static str,
+        /// Writes all of them.
+        write: fn(&Context) -> Result<Vec<Written>>,
+    },
     /// For a site with an adjustment, others with it.
     Several(fn(&Context, &AdjustmentProducts) -> Result<Vec<Written>>),
 }
@@ -219,7 +224,7 @@ impl<'a, T: AsRef<str> + ?Sized> From<&'a T> for Pages<'a> {
 }
 
 /// A file that was written, and its declaration.
-pub(super) type Written = (Product, &'static Declaration);
+pub type Written = (Product, &'static Declaration);
 
 /// Inputs of products.
 pub struct Context<'a> {
@@ -292,9 +297,10 @@ impl Declaration {
                 return format!("a site with footprints, format `{}`", format.word());
             }
             Write::Site(_) => "every site",
-            Write::OfPage(_) => "every figure of the report",
             Write::Image(_) => "every image",
-            Write::Where { sites: when, .. } | Write::ImageWhere { images: when, .. } => when,
+            Write::Where { sites: when, .. }
+            | Write::ImageWhere { images: when, .. }
+            | Write::Many { files: when, .. } => when,
             Write::Ties(_) => "a site with tie points",
             Write::Matched(_) => "a site with matched tie points",
             Write::Adjustment(_) | Write::Several(_) => "a site with an adjustment",

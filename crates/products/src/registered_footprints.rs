@@ -42,7 +42,7 @@ pub(super) static PARQUET: Declaration = Declaration {
         sites: SITES,
         has,
         write: |path, of| {
-            let rows = rows(of.site);
+            let rows = registered_footprints(of.site);
             let points: Vec<[f64; 2]> = rows.iter().map(Row::point_deg).collect();
             let body = of.site.config.body;
             let bounds = bounding_box_deg(points.iter().copied());
@@ -69,7 +69,7 @@ pub(super) static CSV: Declaration = Declaration {
     write: Write::Where {
         sites: "a site with footprints inside its images, format `csv`",
         has: |site| site.has_footprints_in(ShotFormat::Csv) && has(site),
-        write: |path, of| text_table::write(path, table(of.site, rows(of.site))),
+        write: |path, of| text_table::write(path, table(of.site, registered_footprints(of.site))),
     },
     uses: &[],
 };
@@ -84,7 +84,7 @@ pub(crate) static GEOPACKAGE: Declaration = Declaration {
     write: Write::Where {
         sites: SITES,
         has,
-        write: |path, of| geopackage::write(path, features(of, rows(of.site))),
+        write: |path, of| geopackage::write(path, features(of, registered_footprints(of.site))),
     },
     uses: &[Use {
         program: Program::Gis,
@@ -105,30 +105,39 @@ fn has(site: &SiteProducts) -> bool {
 
 /// The column `height_m`: heights above the sphere of the maps, metres.
 pub(super) fn heights_m<'a>(site: &'a SiteProducts<'a>) -> impl Iterator<Item = f64> {
-    rows(site).into_iter().map(|row| row.height_m())
+    registered_footprints(site)
+        .into_iter()
+        .map(|row| row.height_m())
 }
 
 /// A footprint that an image shows.
-struct Row<'a> {
+#[derive(Clone, Copy)]
+pub struct RegisteredFootprint<'a> {
     site: &'a SiteProducts<'a>,
-    image: &'a ImageProducts<'a>,
+    /// Its image.
+    pub image: &'a ImageProducts<'a>,
     /// Row of the footprint.
-    footprint: usize,
+    pub footprint: usize,
     profile: usize,
     /// Its place with the orientation from the kernels, and with the adjusted one.
-    places: [Option<Place>; 2],
+    pub places: [Option<Place>; 2],
     /// The footprint after the adjustment.
-    adjusted: Option<&'a CorrectedPoint>,
+    pub adjusted: Option<&'a CorrectedPoint>,
 }
+
+use RegisteredFootprint as Row;
 
 /// A place in an image.
 #[derive(Clone, Copy)]
-struct Place {
-    line: f64,
-    sample: f64,
+pub struct Place {
+    /// Line, 0 at the leading edge of the first one.
+    pub line: f64,
+    /// Sample, 0 at the outer edge of the first one.
+    pub sample: f64,
     isis_line: Option<f64>,
     isis_sample: Option<f64>,
-    inside: bool,
+    /// Whether it lies inside the delivered image.
+    pub inside: bool,
     extrapolated: bool,
 }
 
@@ -161,7 +170,8 @@ impl Row<'_> {
     }
 
     /// Shift in the image due to the adjustment, pixels.
-    fn moved_px(&self) -> Option<f64> {
+    #[must_use]
+    pub fn moved_px(&self) -> Option<f64> {
         let [before, after] = self.places;
         let (before, after) = (before?, after?);
         Some((after.line - before.line).hypot(after.sample - before.sample))
@@ -169,7 +179,8 @@ impl Row<'_> {
 }
 
 /// The footprints inside images, image by image, in the order of the registration.
-fn rows<'a>(site: &'a SiteProducts<'a>) -> Vec<Row<'a>> {
+#[must_use]
+pub fn registered_footprints<'a>(site: &'a SiteProducts<'a>) -> Vec<RegisteredFootprint<'a>> {
     let adjustment = site.adjustment().map(|(_, adjustment)| adjustment);
     let mut adjusted: BTreeMap<usize, &CorrectedPoint> = BTreeMap::new();
     if let Some(adjustment) = &adjustment {

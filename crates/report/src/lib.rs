@@ -93,6 +93,10 @@ pub use terrain_pictures::terrain_pictures;
 pub mod parts {
     pub use super::{
         html::{Cell, Column, Table, folded_unless, link, paragraph},
+        map::{
+            relief::{COLOURS as HEIGHT_COLOURS, relief_of_shots, shade},
+            round_length_m,
+        },
         numbers::{signed, whole},
         overlays::picture_of,
         plots::label,

@@ -378,7 +378,8 @@ fn ties_rad(site: &SiteProducts) -> Vec<(f64, f64)> {
 }
 
 /// 1, 2 or 5 times a power of ten, at most `length`.
-pub(super) fn round_length_m(length: f64) -> f64 {
+#[must_use]
+pub fn round_length_m(length: f64) -> f64 {
     let power = 10_f64.powf(length.log10().floor());
     let lead = [5.0, 2.0]
         .into_iter()

@@ -19,6 +19,8 @@ use areograph_stages::{
     judge::{Check, CheckKind, NO_BEAM},
 };
 
+/// The page with the same data to explore.
+const EXPLORE: &str = "report/explore.html";
 /// Number of reasons, and of remarks, listed; the rest are counted.
 const REASONS_SHOWN: usize = 4;
 
@@ -92,6 +94,9 @@ fn about(site: &SiteProducts) -> Markup {
             @if !site.images.is_empty() { (traced(&images, "manifest.json#/counts/images")) (taken) "; " }
             (traced(&footprints, "manifest.json#/counts/footprints"))
             " in " (traced(&profiles, "manifest.json#/counts/profiles")) (shot) "."
+            @if site.listed.iter().any(|of| of.path == EXPLORE) {
+                " " (link("explore.html", "Explore map, images and profiles")) "."
+            }
         }
     }
 }

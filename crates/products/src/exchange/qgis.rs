@@ -18,6 +18,7 @@ use areograph_base::error::{Locate as _, Result};
 use areograph_stages::{map_surface::Surface, rectify_images::Orthoimage};
 use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter, write::SimpleFileOptions};
 
+pub use self::vectors::{on_ground_m, tie_residuals};
 use self::{
     map::{Map, equirectangular_wkt},
     project::{Form, Layer},

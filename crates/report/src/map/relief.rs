@@ -18,7 +18,7 @@ const SLOPE: f64 = 0.35;
 /// Largest exaggeration of heights.
 const EXAGGERATION_MAX: f64 = 100.0;
 /// Colours of heights, the lowest first; lightness rises throughout, for any colour vision and any printer.
-pub(super) const COLOURS: [[f64; 3]; 7] = [
+pub const COLOURS: [[f64; 3]; 7] = [
     [38.0, 56.0, 102.0],
     [44.0, 92.0, 126.0],
     [60.0, 127.0, 127.0],
@@ -232,12 +232,16 @@ impl Relief {
         super::round_length_m(wanted)
     }
 
-    /// The picture as an image of an SVG that fills `width` by `height`: colours of heights between `low` and `high`,
-    /// lit from the north-west at 45°.
+    /// The picture as an image of an SVG that fills `width` by `height`.
     ///
     /// # Errors
     /// A picture that the library rejects, which is a bug in areograph.
-    pub(super) fn svg(&self, (low, high): (f64, f64), width: f64, height: f64) -> Result<String> {
+    pub(super) fn svg(&self, heights_m: (f64, f64), width: f64, height: f64) -> Result<String> {
+        Ok(image([0.0, 0.0, width, height], &self.png(heights_m)?))
+    }
+
+    /// The picture: colours of heights between `low` and `high`, lit from the north-west at 45°.
+    fn png(&self, (low, high): (f64, f64)) -> Result<Vec<u8>> {
         let mut pixels = vec![0_u8; 4 * self.shown.len()];
         for (cell, east, south) in self.slopes() {
             let share = (self.surface.values[cell] - low) / (high - low).max(f64::MIN_POSITIVE);
@@ -250,10 +254,28 @@ impl Relief {
             &pixels,
             self.surface.columns as u32,
             self.surface.rows as u32,
-        )
-        .map_err(ProductError::refused("draw a map"))?;
-        Ok(image([0.0, 0.0, width, height], &png))
+        );
+        Ok(png.map_err(ProductError::refused("draw a map"))?)
     }
+}
+
+/// The ground between shots (place on a map and height, metres) as a picture of shaded colours, and its west, south, east
+/// and north edge on the map; `None` without shots.
+///
+/// # Errors
+/// A picture that the library rejects, which is a bug in areograph.
+pub fn relief_of_shots(shots: &[((f64, f64), f64)]) -> Result<Option<(Vec<u8>, [f64; 4])>> {
+    let view = View::of(shots.iter().map(|(place, _)| *place));
+    let Some(relief) = Relief::of(&view, shots.iter().copied()) else {
+        return Ok(None);
+    };
+    let heights_m = shots.iter().map(|(_, height_m)| *height_m);
+    let range = heights_m.fold(
+        (f64::INFINITY, f64::NEG_INFINITY),
+        |(low, high), height_m| (low.min(height_m), high.max(height_m)),
+    );
+    let edges_m = [view.west_m, view.south_m, view.east_m, view.north_m];
+    Ok(Some((relief.png(range)?, edges_m)))
 }
 
 /// Means of three by three cells, the middle weighted most.
@@ -272,7 +294,8 @@ fn smooth(surface: &Grid) -> Vec<f64> {
 ///
 /// # Source
 /// Horn 1981, Hill shading and the reflectance map, Proc. IEEE 69.
-pub(crate) fn shade(east: f64, south: f64) -> f64 {
+#[must_use]
+pub fn shade(east: f64, south: f64) -> f64 {
     // East and south components of the horizontal direction to the light, times its cosine and sine.
     let [to_east, to_south, up] = [-0.5, -0.5, std::f64::consts::FRAC_1_SQRT_2];
     let normal = (1.0 + east * east + south * south).sqrt();

@@ -46,6 +46,9 @@ pub struct ShownImage {
     pub image: usize,
     /// Its quick look.
     pub quick_look: QuickLook,
+    /// The image in more detail, for pages that can be zoomed; `None` where the quick look has all detail, or where the
+    /// site has too many images.
+    pub view: Option<QuickLook>,
     /// Lines of its file, missing ones included.
     pub lines: u32,
     /// Complaints about its file; at most 1000 are kept.
@@ -98,6 +101,19 @@ pub struct PlaceView {
 }
 
 impl Overlays {
+    /// The overlays without the pixels of [`ShownImage::view`].
+    #[must_use]
+    pub fn without_views(&self) -> Self {
+        let images = self.images.iter().map(|shown| ShownImage {
+            view: None,
+            ..shown.clone()
+        });
+        Self {
+            images: images.collect(),
+            places: self.places.clone(),
+        }
+    }
+
     /// The quick look of the image with this index.
     #[must_use]
     pub fn quick_look(&self, image: usize) -> Option<&QuickLook> {
@@ -148,7 +164,7 @@ impl Input for MeasuredTies<'_> {
 
 impl Stage for LayOverlays<'_> {
     const NAME: &'static str = "lay_overlays";
-    const METHOD: u32 = 3;
+    const METHOD: u32 = 4;
     type Output = Overlays;
     stage_inputs!(fingerprint);
 
@@ -173,12 +189,14 @@ impl Stage for LayOverlays<'_> {
             .filter_map(|wanted| views::plan(wanted, &before, &after, &times))
             .collect();
         let mut images = Vec::new();
+        let count = files.iter().flatten().count() as u64;
         for (image, file) in files.iter().enumerate() {
             let Some(file) = file else { continue };
             let patches = planned.iter_mut().flat_map(|place| place.patches_of(image));
             images.push(pixels::read(
                 file,
                 (image, times[image]),
+                count,
                 patches.collect(),
                 stop,
             )?);

@@ -15,6 +15,8 @@ use areograph_pds::{
 
 /// Most pixels of a quick look.
 const QUICK_LOOK_PIXELS: u64 = 1_200_000;
+/// Most pixels of all views of a site: six images of 1024 × 10,112 pixels are complete.
+const VIEW_PIXELS: u64 = 1 << 26;
 /// Complaints kept with their text; all are counted.
 const COMPLAINTS_MAX: usize = 1_000;
 /// Share of the darkest and of the brightest pixels that are shown as black and as white.
@@ -119,18 +121,22 @@ impl Patch {
     }
 }
 
-/// Reads all strips of an image.
+/// Reads all strips of an image, one of so many `images` with pixels.
 ///
 /// # Errors
 /// Read errors; [`Stopped`].
 pub(super) fn read(
     file: &PixelFile,
     (image, times): (usize, &ImageTimes),
+    images: u64,
     mut patches: Vec<&mut Patch>,
     stop: &AtomicBool,
 ) -> Result<ShownImage> {
     let (samples, lines) = (times.samples, file.lines());
-    let mut reduced = Reduced::new(samples, lines, reduction(samples, lines, QUICK_LOOK_PIXELS));
+    let factor = reduction(samples, lines, QUICK_LOOK_PIXELS);
+    let mut reduced = Reduced::new(samples, lines, factor);
+    let finer = reduction(samples, lines, VIEW_PIXELS / images.max(1));
+    let mut view = (finer < factor).then(|| Reduced::new(samples, lines, finer));
     let mut counts = [0_u64; 256];
     let (mut lines_there, mut lines_suspect) = (0, 0);
     let mut strips = file.strips()?;
@@ -140,6 +146,9 @@ pub(super) fn read(
             lines_there += 1;
             lines_suspect += u32::from(state == LineState::Suspect);
             reduced.add(line, pixels, 0);
+            if let Some(view) = &mut view {
+                view.add(line, pixels, 0);
+            }
             for pixel in pixels {
                 counts[usize::from(*pixel)] += 1;
             }
@@ -148,7 +157,7 @@ pub(super) fn read(
             }
         }
     }
-    let quick_look = QuickLook {
+    let finished = |reduced: Reduced| QuickLook {
         range_dn: range_dn(&counts),
         lines_missing: lines - lines_there,
         lines_suspect,
@@ -160,7 +169,8 @@ pub(super) fn read(
     let complaints = opened.iter().chain(decoded).take(COMPLAINTS_MAX);
     Ok(ShownImage {
         image,
-        quick_look,
+        quick_look: finished(reduced),
+        view: view.map(finished),
         lines,
         complaints: complaints.map(ToString::to_string).collect(),
         complaint_count: count + count_decoded,
@@ -302,6 +312,7 @@ mod tests {
             ShownImage {
                 image: 0,
                 quick_look,
+                view: None,
                 lines: 8960,
                 complaints: complaints.iter().map(ToString::to_string).collect(),
                 complaint_count: complaints.len() as u64,

@@ -151,13 +151,15 @@ fn steps_of_outline_m(
 }
 
 /// A residual of a tie point in an image as a displacement on the ground, body-fixed, metres.
-fn on_ground_m(image: &ImageProducts, residual: &ImageResidual) -> Option<Vector3<f64>> {
+#[must_use]
+pub fn on_ground_m(image: &ImageProducts, residual: &ImageResidual) -> Option<Vector3<f64>> {
     let [line, sample] = steps_m(image, residual.x_lines)?;
     let [lines, samples] = residual.in_image_px;
     Some(line * lines + sample * samples)
 }
 
-fn tie_residuals<'a>(
+/// The residuals of all measurements of adjusted tie points, with their images.
+pub fn tie_residuals<'a>(
     site: &'a SiteProducts<'a>,
 ) -> impl Iterator<Item = (&'a ImageProducts<'a>, &'a ImageResidual)> {
     let adjusted = site.adjustment().map(|(_, adjustment)| adjustment.adjusted);

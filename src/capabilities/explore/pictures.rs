@@ -1,0 +1,106 @@
+//! Layers as PNG, with transparent pixels where there is nothing to show.
+
+use png::{BitDepth, ColorType, Compression, Encoder, EncodingError};
+
+use super::layers::{Layer, Part, Pixels};
+use crate::{error::Result, products::error::ProductError};
+
+impl Layer<'_> {
+    /// A file of the layer.
+    ///
+    /// # Errors
+    /// A picture that the library rejects, which is a bug in areograph.
+    pub(super) fn png(&self, part: &Part) -> Result<Vec<u8>> {
+        match &self.pixels {
+            Pixels::Png(file) => Ok(file.clone()),
+            Pixels::Grey(pixels, range) => {
+                let grey = self.reduced(pixels, part, *range);
+                let [rows, columns] = [part.rows, part.columns]
+                    .map(|[from, to]| u32::try_from((to - from).div_ceil(part.step)));
+                let (rows, columns) = (rows.unwrap_or(0), columns.unwrap_or(0));
+                let file = encoded(&grey, columns, rows);
+                Ok(file.map_err(ProductError::refused("draw a picture"))?)
+            }
+        }
+    }
+
+    /// Means of the pixels of squares, stretched; 0 where there is none.
+    fn reduced(&self, pixels: &[u8], part: &Part, [black, white]: [u8; 2]) -> Vec<u8> {
+        let ([top, bottom], [left, right], step) = (part.rows, part.columns, part.step);
+        let width = (right - left).div_ceil(step);
+        let mut reduced = Vec::with_capacity(width * (bottom - top).div_ceil(step));
+        for first in (top..bottom).step_by(step) {
+            let mut sums = vec![(0_u32, 0_u32); width];
+            for row in first..bottom.min(first + step) {
+                let row = &pixels[row * self.size[1] + left..row * self.size[1] + right];
+                for ((sum, count), square) in sums.iter_mut().zip(row.chunks(step)) {
+                    for pixel in square.iter().filter(|pixel| **pixel > 0) {
+                        *sum += u32::from(*pixel);
+                        *count += 1;
+                    }
+                }
+            }
+            let grey = sums.iter().map(|(sum, count)| match count {
+                0 => 0,
+                _ => stretched(f64::from(*sum) / f64::from(*count), black, white),
+            });
+            reduced.extend(grey);
+        }
+        reduced
+    }
+}
+
+/// A brightness from 1 on.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "1 to 255"
+)]
+fn stretched(mean: f64, black: u8, white: u8) -> u8 {
+    let [black, white] = [black, white].map(f64::from);
+    let share = (mean - black) / (white - black).max(1.0);
+    (1.0 + 254.0 * share.clamp(0.0, 1.0)).round() as u8
+}
+
+/// Greys as PNG, 0 transparent.
+fn encoded(grey: &[u8], columns: u32, rows: u32) -> std::result::Result<Vec<u8>, EncodingError> {
+    let mut file = Vec::new();
+    let mut encoder = Encoder::new(&mut file, columns, rows);
+    encoder.set_color(ColorType::Grayscale);
+    encoder.set_depth(BitDepth::Eight);
+    encoder.set_compression(Compression::Fast);
+    encoder.set_trns(vec![0, 0]);
+    encoder.write_header()?.write_image_data(grey)?;
+    Ok(file)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::capabilities::explore::layers::LayerPlace;
+
+    #[test]
+    fn squares_have_the_mean_of_their_known_pixels() {
+        let layer = Layer {
+            name: String::new(),
+            title: String::new(),
+            place: LayerPlace::Map([0.0; 4]),
+            pixels: Pixels::Grey((&[1, 0, 0, 255, 0, 0][..]).into(), [1, 255]),
+            size: [2, 3],
+        };
+        let part = Part {
+            file: String::new(),
+            rows: [0, 2],
+            columns: [0, 3],
+            step: 2,
+        };
+        let file = layer.png(&part).unwrap();
+        let mut reader = png::Decoder::new(std::io::Cursor::new(file))
+            .read_info()
+            .unwrap();
+        assert_eq!(reader.info().trns.as_deref(), Some(&[0, 0][..]));
+        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+        reader.next_frame(&mut pixels).unwrap();
+        assert_eq!(pixels, [128, 0]);
+    }
+}
