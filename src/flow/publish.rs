@@ -30,7 +30,7 @@ use crate::{
 };
 
 /// Raised when the layout of products changes.
-const METHOD: u32 = 37;
+const METHOD: u32 = 38;
 
 /// The products of a site.
 pub(super) struct SitePublication<'a> {
