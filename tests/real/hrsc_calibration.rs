@@ -101,12 +101,16 @@ fn seen(line: &LineCamera, place_m: &Vector3<f64>) -> Option<[f64; 2]> {
     camera.shows(at[0], at[1]).then_some(at)
 }
 
-/// Tables of tie points and laser points. The lines see them `off_px` samples from where the support data have them, as by another
-/// mounting.
-fn tables(lines: &[LineCamera], off_px: [f64; 2]) -> [String; 2] {
-    let mut ties = "point,camera,line,sample\n".to_owned();
-    let mut control = "point,camera,line,sample,longitude_deg,latitude_deg,radius_m\n".to_owned();
-    for index in 0..400_u32 {
+/// A place and where both lines measure it.
+struct Point {
+    index: u32,
+    place: Spherical,
+    measured: [[f64; 2]; 2],
+}
+
+/// Points of the ground that the lines measure `off_px` samples from where the support data have them, as by another mounting.
+fn points(lines: &[LineCamera; 2], off_px: [f64; 2]) -> Vec<Point> {
+    let point = |index: u32| {
         let [row, column] = [index / 20, index % 20].map(f64::from);
         let ray = lines[0]
             .camera
@@ -117,22 +121,35 @@ fn tables(lines: &[LineCamera], off_px: [f64; 2]) -> [String; 2] {
         let along_m = -from_m.dot(&direction);
         let square_m2 = radius_m.powi(2) - (from_m.norm_squared() - along_m.powi(2));
         let place_m = from_m + (along_m - square_m2.sqrt()) * direction;
-        let places = lines.iter().map(|line| seen(line, &place_m));
-        let Some(places) = places.collect::<Option<Vec<_>>>() else {
-            continue;
-        };
-        let place = Spherical::from_xyz_m(&place_m);
+        let seen = [seen(&lines[0], &place_m)?, seen(&lines[1], &place_m)?];
+        let measured = [0, 1].map(|camera| {
+            // As ties are measured: within 0.2 pixels, in no order.
+            let noise_px = 0.2 * (f64::from(index * 2) + camera as f64).powi(2).sin();
+            let [line, sample] = seen[camera];
+            [line - noise_px, sample + off_px[camera] + noise_px]
+        });
+        Some(Point {
+            index,
+            place: Spherical::from_xyz_m(&place_m),
+            measured,
+        })
+    };
+    (0..400).filter_map(point).collect()
+}
+
+/// Tables of tie points and laser points of a calibration.
+fn tables(points: &[Point]) -> [String; 2] {
+    let mut ties = "point,camera,line,sample\n".to_owned();
+    let mut control = "point,camera,line,sample,longitude_deg,latitude_deg,radius_m\n".to_owned();
+    for point in points {
+        let Point { index, place, .. } = point;
         let at = format!(
             "{},{},{:.4}",
             place.longitude_rad.to_degrees(),
             place.latitude.0.to_degrees(),
             place.radius_m
         );
-        for (camera, ([line, sample], off_px)) in places.iter().zip(off_px).enumerate() {
-            // As ties are measured: within 0.2 pixels, in no order.
-            let noise_px = 0.2 * (f64::from(index * 2) + camera as f64).powi(2).sin();
-            let (line, sample) = (line - noise_px, sample + off_px + noise_px);
-            let camera = ["s1", "s2"][camera];
+        for (camera, [line, sample]) in ["s1", "s2"].into_iter().zip(point.measured) {
             match index % 2 {
                 0 => ties += &format!("T{index},{camera},{line:.4},{sample:.4}\n"),
                 _ => control += &format!("L{index},{camera},{line:.4},{sample:.4},{at}\n"),
@@ -142,22 +159,30 @@ fn tables(lines: &[LineCamera], off_px: [f64; 2]) -> [String; 2] {
     [ties, control]
 }
 
+/// The two lines by the support data that a run wrote.
+fn lines(case: &Case) -> [LineCamera; 2] {
+    LINES.map(|line| {
+        let path = case.path(&isd(&line));
+        LineCamera::read(&path, line.line[0], Body::Mars).unwrap()
+    })
+}
+
+fn isd(line: &Level2<'_>) -> String {
+    format!("out/hrsc/images/{}/isd.json", name(line))
+}
+
 #[test]
 fn support_data_of_a_run_are_calibrated_and_used_without_an_edit() {
     let Some(folder) = real_data(FOLDER, "HRSC from kernels to a calibration") else {
         return;
     };
     let case = oriented(&folder);
-    let isd = LINES.map(|line| format!("out/hrsc/images/{}/isd.json", name(&line)));
+    let isd = LINES.each_ref().map(isd);
     for (path, line) in isd.iter().zip(&LINES) {
         assert_eq!(json(&case.path(path))["name_sensor"], line.line[1]);
     }
-    let lines = isd.each_ref().map(|path| {
-        let path = case.path(path);
-        LineCamera::read(&path, "line", Body::Mars).unwrap()
-    });
-    let off_px = [3.0, -2.0];
-    let [ties, control] = tables(&lines, off_px);
+    let (lines, off_px) = (lines(&case), [3.0, -2.0]);
+    let [ties, control] = tables(&points(&lines, off_px));
     case.write("ties.csv", ties);
     case.write("control.csv", control);
     case.write(
@@ -227,10 +252,7 @@ fn level_2_files_are_the_pixels_of_their_own_line_only() {
         return;
     };
     let case = oriented(&folder);
-    let lines = LINES.map(|line| {
-        let path = case.path(&format!("out/hrsc/images/{}/isd.json", name(&line)));
-        LineCamera::read(&path, line.line[0], Body::Mars).unwrap()
-    });
+    let lines = lines(&case);
     let files = LINES.each_ref().map(|line| hashed(&case, line));
     let own = LinePixels::of(files.to_vec());
     assert_eq!(own.decoded(&lines).unwrap().len(), 2);
@@ -268,4 +290,60 @@ fn level_2_files_are_the_pixels_of_their_own_line_only() {
     let told = refused(unknown.file(|line, sample| (line + sample) as u8));
     let expected = "instrument is \"HRSC MEX_HRSC_S9\"; expected MOC-NA, ";
     assert!(told.contains(expected), "{told}");
+}
+
+/// The orbits of Mars Express are less accurate than those of the spacecraft with the laser, which its file states.
+#[test]
+fn a_site_has_the_accuracy_of_its_spacecraft() {
+    let Some(folder) = real_data(FOLDER, "accuracy of Mars Express") else {
+        return;
+    };
+    let case = oriented(&folder);
+    let mut ties = "point_id,serial_number,sample,line\n".to_owned();
+    for point in points(&lines(&case), [0.0; 2]).iter().step_by(9) {
+        for (line, [at_line, sample]) in LINES.iter().zip(point.measured) {
+            ties += &format!("T{},{},{sample:.4},{at_line:.4}\n", point.index, name(line));
+        }
+    }
+    case.write("site_ties.csv", ties);
+    case.replace(
+        "site.toml",
+        "[[images]]\nid = 'h5270_0000_s12'",
+        "[ties]\nfiles = ['site_ties.csv']\n[[images]]\nid = 'h5270_0000_s12'",
+    );
+    let stated = |keys: &str| {
+        if !keys.is_empty() {
+            case.replace(
+                "site.toml",
+                "[ties]",
+                &format!("[adjustment]\n{keys}\n[ties]"),
+            );
+        }
+        let told = case.outcome(case.run());
+        assert!(!told.contains("withheld"), "{told}");
+        let document = json(&case.path("out/hrsc/adjustment.json"));
+        let configured = document["configured"]["adjustment"].clone();
+        let page = fs::read_to_string(case.path("out/hrsc/report/index.html")).unwrap();
+        let axis = page.split("largest semi-axis ").nth(1).unwrap();
+        let axis_m: f64 = axis.split(' ').next().unwrap().parse().unwrap();
+        (configured, axis_m)
+    };
+    let (configured, axis_m) = stated("");
+    assert_eq!(
+        configured["position_sigma_m"],
+        serde_json::json!([1000.0, 100.0, 0.0])
+    );
+    let own_arcsec = configured["rotation_sigma_rad"][0]
+        .as_f64()
+        .unwrap()
+        .to_degrees()
+        * 3600.0;
+    assert!((own_arcsec - 90.0).abs() < 1e-9); // arc seconds, 25 mdeg
+    // Metres: two images of 1000 m each have a common error of 700 m at least.
+    assert!((700.0..3_000.0).contains(&axis_m), "{axis_m}");
+    // What a site states precedes.
+    let (configured, axis_m) =
+        stated("position_sigma_m = [25.0, 0.2, 0.0]\nrotation_sigma_arcsec = [82.5, 2.0, 2.0]");
+    assert_eq!(configured["position_sigma_m"][0], 25.0);
+    assert!(axis_m < 300.0, "{axis_m}");
 }
