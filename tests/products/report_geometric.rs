@@ -27,7 +27,7 @@ use areograph::{
     },
     units::RADIANS_PER_ARCSECOND,
 };
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 use page::{csv, lead, number, section, table, text};
 use site::Site;
 
@@ -513,17 +513,17 @@ fn several_pairs_are_pooled_as_the_sites_of_the_paper() {
     );
 }
 
-/// Support data of a spacecraft, without tables, which no page shows.
+/// Support data of a spacecraft, with the shortest tables; no page shows them.
 fn support_of(platform: &str) -> SupportFile {
     let states = States {
-        et_s: Vec::new(),
-        position_m: Vec::new(),
-        velocity_m_s: Vec::new(),
+        et_s: vec![0.0, 1.0],
+        position_m: vec![Vector3::x() * 4e6; 2],
+        velocity_m_s: vec![Vector3::zeros(); 2],
     };
     let rotations = Rotations {
-        et_s: Vec::new(),
-        turning: Vec::new(),
-        rate_rad_s: Vec::new(),
+        et_s: vec![0.0, 1.0],
+        turning: vec![Matrix3::identity(); 2],
+        rate_rad_s: vec![Vector3::zeros(); 2],
         constant: Matrix3::identity(),
     };
     SupportFile {
