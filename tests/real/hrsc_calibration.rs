@@ -6,7 +6,8 @@
     clippy::panic,
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
-    reason = "helpers of tests work in temporary folders, may fail loudly, and make samples of small numbers"
+    clippy::format_push_string,
+    reason = "helpers of tests work in temporary folders, may fail loudly, make samples of small numbers, and write short tables"
 )]
 
 use crate::common;
