@@ -130,7 +130,7 @@ pub(super) fn match_ties<D: Driver>(
         pixels: PixelFiles(&pixels),
         converted,
         profiles,
-        margin: &Margin::of(config, round),
+        margin: &Margin::of(config, images, round),
         read: TiesOfFiles(read),
     }))
 }

@@ -50,7 +50,7 @@ fn kind_and_advice_are_those_of_the_attributes() {
                 known: vec![],
             }),
             Kind::Input,
-            "set `instrument` in the image's table to the camera that took it: a camera known to areograph, or an \
+            "give an image of a camera known to areograph; in a site, `instrument` in the image's table can also name an \
              instrument file",
         ),
         (

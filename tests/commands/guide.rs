@@ -14,7 +14,7 @@ use std::{
     process::Command,
 };
 
-use areograph::config::{Document as _, SiteConfig};
+use areograph::config::{CalibrationConfig, Document as _, SiteConfig};
 use areograph_testing::checkout;
 
 use crate::common::mission::{areograph, mission};
@@ -239,13 +239,16 @@ fn site_files_of_the_front_pages_are_valid() {
     let is_whole = |block: &&&str| block.trim().starts_with("site = ");
     let whole = blocks.iter().find(is_whole).unwrap();
     for block in &blocks {
-        let site = if is_whole(&block) {
-            (*block).to_owned()
-        } else {
-            format!("{whole}\n{SECOND_IMAGE}\n{block}")
-        };
+        let path = checkout().join("sites/site.toml");
         // The files that an example names do not exist.
-        let failure = SiteConfig::parse(&site, &checkout().join("sites/site.toml")).unwrap_err();
+        let failure = if block.trim().starts_with("calibration = ") {
+            CalibrationConfig::parse(block, &path).unwrap_err()
+        } else if is_whole(&block) {
+            SiteConfig::parse(block, &path).unwrap_err()
+        } else {
+            let site = format!("{whole}\n{SECOND_IMAGE}\n{block}");
+            SiteConfig::parse(&site, &path).unwrap_err()
+        };
         let failure = failure.to_string();
         let of_files = |line: &&str| {
             let file = [

@@ -15,6 +15,7 @@ use areograph::{
     capabilities,
     config::all_instruments,
     geom::uncertainty::GroundPart,
+    pds::isd::{Rotations, States, SupportTables},
     stages::{
         adjust::{
             ObservationType, OtherReading, PointKind, RejectedPoint, RejectionReason,
@@ -22,9 +23,11 @@ use areograph::{
         },
         compare_pairs::PairComparison,
         judge::{CheckKind, CheckOutcome},
+        tag_times::SupportFile,
     },
     units::RADIANS_PER_ARCSECOND,
 };
+use nalgebra::{Matrix3, Vector3};
 use page::{csv, lead, number, section, table, text};
 use site::Site;
 
@@ -510,8 +513,36 @@ fn several_pairs_are_pooled_as_the_sites_of_the_paper() {
     );
 }
 
+/// Support data of a spacecraft, with the shortest tables; no page shows them.
+fn support_of(platform: &str) -> SupportFile {
+    let states = States {
+        et_s: vec![0.0, 1.0],
+        position_m: vec![Vector3::x() * 4e6; 2],
+        velocity_m_s: vec![Vector3::zeros(); 2],
+    };
+    let rotations = Rotations {
+        et_s: vec![0.0, 1.0],
+        turning: vec![Matrix3::identity(); 2],
+        rate_rad_s: vec![Vector3::zeros(); 2],
+        constant: Matrix3::identity(),
+    };
+    SupportFile {
+        name: "isd.json".to_owned(),
+        bytes: 0,
+        blake3: String::new(),
+        platform: platform.to_owned(),
+        has_laser: false,
+        tables: SupportTables {
+            position: states.clone(),
+            sun: states,
+            pointing: rotations.clone(),
+            body_rotation: rotations,
+        },
+    }
+}
+
 #[test]
-fn accuracy_by_the_values_of_another_spacecraft_is_withheld() {
+fn accuracy_by_the_values_of_an_unknown_spacecraft_is_withheld() {
     let mut site = Site::gusev();
     let heights = site.adjusted.heights.as_ref().unwrap();
     site.adjusted.other_reading = Some(Ok(OtherReading {
@@ -520,20 +551,27 @@ fn accuracy_by_the_values_of_another_spacecraft_is_withheld() {
         moved_m: [10.0, 120.0, 1.0],
     }));
     assert!(text(lead(&site.page())).contains("m height"));
+    let reason = |site: &Site| {
+        site.with(|products| {
+            let times = products.images.iter().map(|image| image.times);
+            accuracy_withheld(products.config, times)
+        })
+    };
+    // The accuracy of another spacecraft is in its file.
     let other = all_instruments()
         .iter()
         .find(|camera| !camera.spacecraft.has_laser())
         .unwrap();
+    let own = site.times[0].instrument.clone();
     for times in &mut site.times {
         times.instrument = other.clone();
     }
-    let withheld = site.with(|products| {
-        accuracy_withheld(
-            products.config,
-            products.images.iter().map(|image| image.times),
-        )
-    });
-    let withheld = withheld.unwrap();
+    assert_eq!(reason(&site), None);
+    for times in &mut site.times {
+        times.instrument = own.clone();
+        times.support = Some(support_of("LUNAR RECONNAISSANCE ORBITER"));
+    }
+    let withheld = reason(&site).unwrap();
     assert!(withheld.contains("position_sigma_m"), "{withheld}");
     let page = site.page();
     assert!(text(lead(&page)).contains("withheld"));
@@ -548,8 +586,8 @@ fn accuracy_by_the_values_of_another_spacecraft_is_withheld() {
     }
     assert_eq!(rows.len(), 2);
     // With values of its own the site states what follows from them.
-    site.config.adjustment.position_sigma_m = [1_000.0, 1.0, 0.0];
-    site.config.adjustment.rotation_sigma_rad = [4e-4, 1e-5, 0.0];
+    site.config.adjustment.position_sigma_m = Some([1_000.0, 1.0, 0.0]);
+    site.config.adjustment.rotation_sigma_rad = Some([4e-4, 1e-5, 0.0]);
     let page = site.page();
     // Profiles are withheld from the surface as well, and predicted from it.
     for words in [

@@ -411,7 +411,6 @@ fn case(folder: &Path, names: &[&str]) -> Case {
     }
     let site = format!(
         "site = 'hrsc'\n[kernels]\nfiles = [{}]\n[orientation]\nlight_time = 'centre'\n\
-         position_rmse_max_m = 1e5\npointing_rmse_max_arcsec = 3600\n\
          [[images]]\nid = 'h5270'\ninstrument = 'hrsc_ir'\nexposures = {EXPOSURES}\n\
          utc_start = '2008-02-08T12:08:53.843'\ndowntrack_summing = 4\ncrosstrack_summing = 4\n\
          lines_header = 15088\nsamples = 1288\nfirst_detector = 0\n",

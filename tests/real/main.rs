@@ -4,6 +4,7 @@ mod archives;
 #[path = "../common/mod.rs"]
 mod common;
 mod exchange_isd;
+mod hrsc_calibration;
 mod hrsc_images;
 mod hrsc_orientation;
 mod kernels_from_folder;

@@ -12,6 +12,8 @@ pub const CONTROL_SIGMA_MAX_M: f64 = 3_000.0;
 
 use serde::Deserialize;
 
+use crate::units::RADIANS_PER_ARCSECOND;
+
 /// Folder that `areograph fetch` keeps beside the files that it fetches: parts of files, copies of indexes.
 pub const FETCH_FOLDER: &str = ".fetch";
 /// NAIF id of the centre of Mars.
@@ -75,6 +77,30 @@ pub struct Spacecraft {
     pub ck_bias_max_s: f64,
     /// Source of these values.
     pub source: String,
+    /// A priori accuracy of its orbit and attitude, used by sites that state none.
+    pub a_priori: OrientationAccuracy,
+}
+
+/// Standard deviations of the orientation of an image, equal on all axes, for the powers 0, 1 and 2 of t; t is 0 in the
+/// middle of the image and 1 at its end.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OrientationAccuracy {
+    /// Of positions, metres.
+    pub position_sigma_m: [f64; 3],
+    /// Of rotations about the camera axes, arc seconds.
+    pub rotation_sigma_arcsec: [f64; 3],
+    /// Source of these values.
+    pub source: String,
+}
+
+impl OrientationAccuracy {
+    /// Standard deviations of rotations, radians.
+    #[must_use]
+    pub fn rotation_sigma_rad(&self) -> [f64; 3] {
+        self.rotation_sigma_arcsec
+            .map(|sigma| sigma * RADIANS_PER_ARCSECOND)
+    }
 }
 
 impl Spacecraft {
@@ -88,6 +114,14 @@ impl Spacecraft {
     #[must_use]
     pub fn of_id(id: &str) -> Option<&'static Self> {
         ALL.iter().find(|spacecraft| spacecraft.id == id)
+    }
+
+    /// The spacecraft with this name in labels, where underscores may replace blanks.
+    #[must_use]
+    pub fn of_label_name(name: &str) -> Option<&'static Self> {
+        let name = name.replace('_', " ");
+        let mut all = ALL.iter();
+        all.find(|spacecraft| spacecraft.label_name.eq_ignore_ascii_case(&name))
     }
 
     /// Its index in [`Self::all`].

@@ -54,6 +54,18 @@ pub struct Instrument {
     pub pointing: PointingTime,
 }
 
+impl Instrument {
+    /// Its name in support data: that of its frame, or its filter where several cameras share a frame, as the nine
+    /// lines of the HRSC share that of the camera head.
+    #[must_use]
+    pub fn sensor_name(&self) -> &str {
+        match &self.label.filter {
+            Some(filter) if self.naif.frame_id != self.naif.instrument => filter,
+            _ => &self.naif.frame,
+        }
+    }
+}
+
 #[expect(
     clippy::trivially_copy_pass_by_ref,
     reason = "serde passes fields by reference"

@@ -3,6 +3,7 @@
 use serde::Deserialize;
 
 use areograph_base::{
+    constants::Spacecraft,
     footprints::{AdjustmentModel, FootprintImageCoordinates},
     units::{RADIANS_PER_ARCSECOND, SECONDS_PER_MS},
 };
@@ -55,16 +56,18 @@ declare_table! {
         /// 2004); standard deviations in a tie point file take precedence.
         tie_sigma_px: [f64; 2] = key(SIGMAS).or([1.0, 1.0]),
         /// Standard deviations of X, Y and Z of every image for the powers 0, 1 and 2 of t; t is 0 in the middle of the
-        /// image and 1 at its end. An unknown is free with inf and fixed with 0. The orbits of three producers differ
-        /// by up to 50 m (Shan et al. 2005), and orbit errors vary from revolution to revolution.
-        position_sigma_m: [f64; 3] = key(SIGMAS_OF_TIME).or([25.0, 0.2, 0.0]),
+        /// image and 1 at its end. An unknown is free with inf and fixed with 0. Without this key, each image has the
+        /// values of its spacecraft (`config/spacecraft`), here those of Mars Global Surveyor: the orbits of three
+        /// producers differ by up to 50 m (Shan et al. 2005), and orbit errors vary from revolution to revolution. For
+        /// Mars Express, the values are 1000, 100 and 0 m (Li et al. 2023); recent orbits are more accurate.
+        position_sigma_m: Option<[f64; 3]> = key(SIGMAS_OF_TIME).unused("[25.0, 0.2, 0.0]"),
         /// Standard deviations of the rotations about the camera axes for the powers 0, 1 and 2 of t, as in
-        /// `position_sigma_m`. The default of the constant term (0.4 mrad, or 150 m on the ground) corresponds to the
-        /// along-track distances between the images of a pair, and the defaults of the drift terms correspond to the
-        /// residuals of the attitude.
-        rotation_sigma_rad as "rotation_sigma_arcsec": [f64; 3] = key(SIGMAS_OF_TIME)
-            .or([82.5, 2.0, 2.0])
-            .map(|sigmas| sigmas.map(|sigma| sigma * RADIANS_PER_ARCSECOND)),
+        /// `position_sigma_m`. For Mars Global Surveyor, the constant term (0.4 mrad, or 150 m on the ground)
+        /// corresponds to the along-track distances between the images of a pair, and the drift terms correspond to the
+        /// residuals of the attitude. For Mars Express, the constant term is 90 arc seconds (Li et al. 2023).
+        rotation_sigma_rad as "rotation_sigma_arcsec": Option<[f64; 3]> = key(SIGMAS_OF_TIME)
+            .unused("[82.5, 2.0, 2.0]")
+            .map(|sigmas| sigmas.map(|sigmas| sigmas.map(|sigma| sigma * RADIANS_PER_ARCSECOND))),
         /// Position unknowns of every image, as powers of t (spsolve in jigsaw); higher powers are not estimated,
         /// regardless of their standard deviations.
         position_unknowns: PositionUnknowns = key(words_of(
@@ -236,6 +239,21 @@ fn keys_of_the_model(checked: &AdjustmentConfig, keys: &mut Keys<'_, '_>) {
 }
 
 impl AdjustmentConfig {
+    /// Standard deviations of positions of images from this spacecraft, for the powers 0, 1 and 2 of time, metres.
+    #[must_use]
+    pub fn position_sigma_m(&self, spacecraft: &Spacecraft) -> [f64; 3] {
+        let usual = &spacecraft.a_priori;
+        self.position_sigma_m.unwrap_or(usual.position_sigma_m)
+    }
+
+    /// Standard deviations of rotations of images from this spacecraft, for the powers 0, 1 and 2 of time, radians.
+    #[must_use]
+    pub fn rotation_sigma_rad(&self, spacecraft: &Spacecraft) -> [f64; 3] {
+        let usual = &spacecraft.a_priori;
+        self.rotation_sigma_rad
+            .unwrap_or_else(|| usual.rotation_sigma_rad())
+    }
+
     /// Use of the image coordinates of footprints.
     #[must_use]
     pub fn footprints_in_images(&self) -> FootprintImageCoordinates {

@@ -165,8 +165,8 @@ declare_table! {
         /// same frame, that of the spacecraft, from which `constant_rotation` leads to each camera.
         #[serde(skip)]
         isd: PathBuf = key(FILE).required().example(r#""isd/s1.json""#),
-        /// File with the pixels of the whole image: a greyscale TIFF or PNG of one band, or a cube. Only for
-        /// ties.match.
+        /// File with the pixels of the whole image: a level-2 archive file (`h….img`) of the HRSC, a greyscale TIFF or
+        /// PNG of one band, or a cube. Only for ties.match.
         #[serde(skip)]
         pixels: Option<PathBuf> = key(FILE).unused(r#""images/s1.tif""#),
     }

@@ -401,6 +401,14 @@ fn serial_numbers(keys: &mut Keys<'_, '_>) {
     }
 }
 
+/// What is expected of an identifier of one of these images.
+fn one_of_images(images: &[&str]) -> String {
+    match images {
+        [] => "an image of the site, but the site has none".to_owned(),
+        _ => format!("one of the site's images: {}", images.join(", ")),
+    }
+}
+
 /// Windows that are outlines of images belong to images of the site.
 fn images_of_windows(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     let known: BTreeSet<&str> = site.images.iter().map(|image| &*image.id).collect();
@@ -410,11 +418,7 @@ fn images_of_windows(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
         };
         if id.get_ref().as_str().is_some_and(|id| !known.contains(id)) {
             let images: Vec<&str> = known.iter().copied().collect();
-            let expected = if images.is_empty() {
-                "an image of the site, but the site has none".to_owned()
-            } else {
-                format!("one of the site's images: {}", images.join(", "))
-            };
+            let expected = one_of_images(&images);
             keys.review().refuse(id.span(), "windows.image", expected);
         }
     }
@@ -427,7 +431,7 @@ fn priors_of_images(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
         let Some(id) = prior.get("id") else { continue };
         if id.get_ref().as_str().is_some_and(|id| !known.contains(id)) {
             let images: Vec<&str> = site.images.iter().map(|image| &*image.id).collect();
-            let expected = format!("one of the site's images: {}", images.join(", "));
+            let expected = one_of_images(&images);
             keys.review()
                 .refuse(id.span(), "adjustment.images.id", expected);
         }

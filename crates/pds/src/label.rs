@@ -125,7 +125,7 @@ pub enum LabelError {
     /// Another instrument's image.
     #[error("instrument is {found:?}; expected {}", listed(known))]
     #[cause(
-        "set `instrument` in the image's table to the camera that took it: a camera known to areograph, or an \
+        "give an image of a camera known to areograph; in a site, `instrument` in the image's table can also name an \
          instrument file"
     )]
     Instrument {
@@ -139,6 +139,7 @@ pub enum LabelError {
 /// `a, b or c`.
 fn listed(words: &[String]) -> String {
     match words {
+        [] => "a picture or an ISIS cube, since no camera is known here".to_owned(),
         [first @ .., before, last] => [first, &[format!("{before} or {last}")]]
             .concat()
             .join(", "),

@@ -292,7 +292,7 @@ fn document<'a>(
             model: site.config.registration.model,
             light_time: site.config.orientation.light_time,
             intersection: &site.config.intersection,
-            adjustment: AdjustmentKeys::of(&site.config.adjustment),
+            adjustment: AdjustmentKeys::of(&site.config.adjustment, site.images),
         },
         ties: TiesDocument {
             points: ties.points.len(),

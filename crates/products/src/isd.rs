@@ -149,12 +149,13 @@ fn isd<'a>(site: &SiteProducts<'a>, view: &View<'a>) -> Isd<'a> {
     let start_s = times.line_times.start().seconds();
     // Half the time of the delivered lines: camera models know no other lines.
     let half_s = 0.5 * times.line_times.seconds(f64::from(times.lines_delivered));
+    let instrument = &times.instrument;
     let Instrument {
         naif,
         optics,
         detector,
         ..
-    } = &times.instrument;
+    } = instrument;
     let pixels_per_mm = optics.pixel_pitch_mm.recip();
     Isd {
         isis_camera_version: 1,
@@ -164,10 +165,10 @@ fn isd<'a>(site: &SiteProducts<'a>, view: &View<'a>) -> Isd<'a> {
         name_platform: times
             .support
             .as_ref()
-            .map_or(&times.instrument.spacecraft.label_name, |support| {
+            .map_or(&instrument.spacecraft.label_name, |support| {
                 &support.platform
             }),
-        name_sensor: &naif.frame,
+        name_sensor: instrument.sensor_name(),
         reference_height: ReferenceHeight {
             maxheight: REFERENCE_HEIGHT_M,
             minheight: -REFERENCE_HEIGHT_M,
@@ -199,7 +200,7 @@ fn isd<'a>(site: &SiteProducts<'a>, view: &View<'a>) -> Isd<'a> {
         focal2pixel_samples: [0.0, 0.0, detector.samples_along.sign() * pixels_per_mm],
         optical_distortion: OpticalDistortion {
             radial: Radial {
-                coefficients: times.detector().radial_fit(&times.instrument).coefficients,
+                coefficients: times.detector().radial_fit(instrument).coefficients,
             },
         },
         starting_detector_line: 0,

@@ -21,6 +21,7 @@ pub mod cube;
 pub mod eos_2002;
 pub mod golden;
 pub mod kept;
+pub mod level_2;
 pub mod lunar_pair;
 pub mod moc_file;
 pub mod orbits;

@@ -199,8 +199,7 @@ fn naif_names(document: &Object<'_>, frame: String) -> Result<NaifNames, IsdErro
 /// The spacecraft with this name; for an unknown one only its support data are used, and products are filed under the
 /// default one.
 fn spacecraft(platform: &str) -> &'static Spacecraft {
-    let named = |one: &&Spacecraft| one.label_name.eq_ignore_ascii_case(platform);
-    Spacecraft::all().iter().find(named).unwrap_or(&SPACECRAFT)
+    Spacecraft::of_label_name(platform).unwrap_or(&SPACECRAFT)
 }
 
 /// Angles of a rotation `[yaw]₃ [pitch]₂ [roll]₁`.

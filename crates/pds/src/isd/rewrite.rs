@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 use serde_json::{Value, json};
 
 use super::{
-    SupportSource,
+    CALIBRATED_BY, SupportSource,
     document::{IsdError, Object},
 };
 use areograph_base::{error::Result, units::METRES_PER_KM};
@@ -51,6 +51,10 @@ fn rewritten(
         .object("focal_length_model")?
         .number("focal_length", [f64::MIN_POSITIVE, 1e9])?;
     let (positions, velocities) = states(&document, shift_m)?;
+    // Of an earlier calibration.
+    if let Some(keys) = value.as_object_mut() {
+        keys.remove(CALIBRATED_BY);
+    }
     let pixels_per_mm = summing / (camera.tangent_per_sample * focal_mm);
     let boresight_px = first + camera.boresight_sample * summing;
     // Row by row, which are the columns of the transpose.

@@ -3,7 +3,9 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::site::ImageProducts;
 use areograph_base::{
+    constants::SPACECRAFT,
     footprints::{AdjustmentModel, FootprintImageCoordinates},
     schema::{all_positive, none_negative},
 };
@@ -90,10 +92,20 @@ struct PriorKeys<'a> {
 }
 
 impl<'a> AdjustmentKeys<'a> {
-    pub(super) fn of(config: &'a AdjustmentConfig) -> Self {
+    /// The keys; standard deviations that the spacecraft of the images determine are left out where these differ.
+    pub(super) fn of(config: &'a AdjustmentConfig, images: &[ImageProducts<'_>]) -> Self {
         // JSON has no infinity.
         let number = |sigma: f64| sigma.min(f64::MAX);
         let is_of_surface = config.model == AdjustmentModel::MolaSurface;
+        let mut spacecraft = images.iter().map(|of| of.times.instrument.spacecraft);
+        let first = spacecraft.next().unwrap_or(*SPACECRAFT);
+        let common = spacecraft.all(|other| other == first).then_some(first);
+        let position_m = config
+            .position_sigma_m
+            .or_else(|| Some(config.position_sigma_m(common?)));
+        let rotation_rad = config
+            .rotation_sigma_rad
+            .or_else(|| Some(config.rotation_sigma_rad(common?)));
         let published_m = (!is_of_surface).then(|| config.published_sigmas_m().map(number));
         let prior = |prior: &'a OrientationPrior| PriorKeys {
             id: &prior.id,
@@ -112,8 +124,12 @@ impl<'a> AdjustmentKeys<'a> {
             range_sigma_m: config.range_sigma_m,
             range_bias_sigma_m: config.range_bias_m(),
             time_bias_sigma_s: config.time_bias_sigma_s,
-            position_sigma_m: is_of_surface.then(|| config.position_sigma_m.map(number)),
-            rotation_sigma_rad: is_of_surface.then(|| config.rotation_sigma_rad.map(number)),
+            position_sigma_m: position_m
+                .filter(|_| is_of_surface)
+                .map(|of| of.map(number)),
+            rotation_sigma_rad: rotation_rad
+                .filter(|_| is_of_surface)
+                .map(|of| of.map(number)),
             line_time_sigma_s: is_of_surface.then_some(config.line_time_sigma_s),
             position_unknowns: config.position_unknowns,
             rotation_unknowns: config.rotation_unknowns,

@@ -15,6 +15,7 @@ use super::{
 };
 use areograph_base::error::{Locate as _, Result};
 use areograph_config::CalibrationConfig;
+use areograph_pds::isd::CALIBRATED_BY;
 use areograph_stages::calibrate::{Calibration, CameraResult};
 
 /// Placeholder of a camera in paths.
@@ -45,7 +46,7 @@ static PRODUCTS: &[&Declaration<WriteCalibration>] = &[
 ];
 
 /// Writer of a product of a camera.
-pub(super) type WriteCamera = fn(&Path, &CameraResult) -> Result<u64>;
+pub(super) type WriteCamera = fn(&Path, &CalibrationProducts, &CameraResult) -> Result<u64>;
 
 /// Support data of a camera.
 static CAMERA_SUPPORT: Declaration<WriteCamera> = Declaration {
@@ -55,9 +56,18 @@ static CAMERA_SUPPORT: Declaration<WriteCamera> = Declaration {
     rows: "",
     role: Role::Data,
     content: Content::Foreign,
-    write: |path, of| write_text(path, &of.isd).map(|()| 0),
+    write: |path, of, camera| {
+        let named = named_by(&camera.isd, &of.config.calibration, &camera.camera);
+        write_text(path, &named).map(|()| 0)
+    },
     uses: &[],
 };
+
+/// Support data that state by which calibration, and as which camera, they were calibrated.
+fn named_by(isd: &str, calibration: &str, camera: &str) -> String {
+    let origin = serde_json::json!({"calibration": calibration, "camera": camera});
+    isd.replacen('{', &format!("{{\n  \"{CALIBRATED_BY}\": {origin},"), 1)
+}
 
 static REPORT: Declaration<WriteCalibration> =
     Declaration::report("the report of the calibration", |path, of| {
@@ -88,7 +98,7 @@ pub fn write_calibration_products(
     for camera in &of.result.cameras {
         let relative = CAMERA_SUPPORT.path.replace(CAMERA, &camera.camera);
         let path = directory.join(&relative);
-        let rows = (CAMERA_SUPPORT.write)(&path, camera).in_file(&path)?;
+        let rows = (CAMERA_SUPPORT.write)(&path, of, camera).in_file(&path)?;
         products.push(Product {
             path: relative.into(),
             rows,

@@ -33,7 +33,7 @@ pub(super) struct Isd<'a> {
     #[schemars(range(min = 1))]
     pub(super) image_samples: u32,
     pub(super) name_platform: &'a str,
-    /// The camera's frame.
+    /// The camera's frame, or its filter where cameras share a frame.
     pub(super) name_sensor: &'a str,
     pub(super) reference_height: ReferenceHeight,
     #[schemars(extend("const" = "USGS_ASTRO_LINE_SCANNER_SENSOR_MODEL"))]

@@ -1,11 +1,15 @@
-//! For which images the default accuracy of orbit and attitude holds.
+//! For which images the a priori accuracy of orbit and attitude is known.
 
 use crate::tag_times::ImageTimes;
-use areograph_base::{constants::SPACECRAFT, footprints::AdjustmentModel};
-use areograph_config::{AdjustmentConfig, SiteConfig, usual_altimeter};
+use areograph_base::{
+    constants::{SPACECRAFT, Spacecraft},
+    footprints::AdjustmentModel,
+};
+use areograph_config::{SiteConfig, usual_altimeter};
 
-/// Reason for withholding a site's absolute accuracies: the default standard deviations of its orientations apply to
-/// one spacecraft, and these images are not known to be from it. `None` where each image is, or has its own values.
+/// Reason for withholding a site's absolute accuracies: images of support data from an unknown spacecraft are given the
+/// standard deviations of the default one. `None` where the spacecraft of each image is known, or the site states its
+/// values.
 ///
 /// Stated position accuracies are the a priori ones, and stated height accuracies contain them on slopes.
 pub fn accuracy_withheld<'a>(
@@ -13,23 +17,22 @@ pub fn accuracy_withheld<'a>(
     images: impl IntoIterator<Item = &'a ImageTimes>,
 ) -> Option<String> {
     let config = &site.adjustment;
-    if config.model == AdjustmentModel::Published || is_configured(config) {
+    let is_configured = config.position_sigma_m.is_some() && config.rotation_sigma_rad.is_some();
+    if config.model == AdjustmentModel::Published || is_configured {
         return None;
     }
-    let is_of_it = |times: &ImageTimes| match &times.support {
-        Some(support) => {
-            let platform = support.platform.replace('_', " ");
-            platform.eq_ignore_ascii_case(&SPACECRAFT.label_name)
+    let is_known = |times: &ImageTimes| {
+        times.support.as_ref().is_none_or(|support| {
+            Spacecraft::of_label_name(&support.platform).is_some()
                 || (support.has_laser && site.altimeter.id == usual_altimeter().id)
-        }
-        None => times.instrument.spacecraft.has_laser(),
+        })
     };
     let has_own = |times: &ImageTimes| {
         let own = config.images.iter().find(|own| own.id == times.id);
         own.is_some_and(|own| own.position_m.is_some() && own.rotation_rad.is_some())
     };
     let images = images.into_iter();
-    let assumed = images.filter(|times| !is_of_it(times) && !has_own(times));
+    let assumed = images.filter(|times| !is_known(times) && !has_own(times));
     let assumed: Vec<&str> = assumed.map(|times| &*times.id).collect();
     (!assumed.is_empty()).then(|| {
         format!(
@@ -40,16 +43,4 @@ pub fn accuracy_withheld<'a>(
             assumed.join(", ")
         )
     })
-}
-
-/// Whether the site has its own standard deviations.
-fn is_configured(config: &AdjustmentConfig) -> bool {
-    let defaults = AdjustmentConfig::default();
-    let differ = |own: &[f64], default: &[f64]| {
-        own.iter()
-            .zip(default)
-            .any(|(own, default)| own.to_bits() != default.to_bits())
-    };
-    differ(&config.position_sigma_m, &defaults.position_sigma_m)
-        && differ(&config.rotation_sigma_rad, &defaults.rotation_sigma_rad)
 }

@@ -54,7 +54,11 @@ impl<M: ExteriorOrientation> Candidate<'_, M> {
     fn weighed(self, laser: &Altimeter, config: &AdjustmentConfig) -> AdjustImage<M> {
         let mut sigmas = match config.model {
             AdjustmentModel::MolaSurface => {
-                sigmas_of_powers(&config.position_sigma_m, &config.rotation_sigma_rad)
+                let spacecraft = self.times.instrument.spacecraft;
+                sigmas_of_powers(
+                    &config.position_sigma_m(spacecraft),
+                    &config.rotation_sigma_rad(spacecraft),
+                )
             }
             AdjustmentModel::Published => self.published_sigmas(config),
         };

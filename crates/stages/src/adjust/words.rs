@@ -24,7 +24,7 @@ pub(super) fn in_words<M>(
         } => AdjustError::NotConverged {
             steps,
             weighted_squares,
-            held_by: held_by(config),
+            held_by: held_by(config, images),
         },
         BundleError::Singular { unknowns } => {
             let words: Vec<String> = unknowns
@@ -48,16 +48,22 @@ pub(super) fn in_words<M>(
 }
 
 /// The keys that constrain orientations, with their values.
-fn held_by(config: &AdjustmentConfig) -> String {
+fn held_by<M>(config: &AdjustmentConfig, images: &[AdjustImage<M>]) -> String {
     let of_model = match config.model {
         AdjustmentModel::MolaSurface => {
+            // Of the first image, where its spacecraft determines them.
+            let [position, rotation] = [0, 9].map(|first| {
+                let sigmas = images.first().map(|image| &image.sigmas[first..first + 3]);
+                sigmas.map_or([0.0; 3], |sigmas| [0, 1, 2].map(|power| sigmas[power]))
+            });
+            let position_m = config.position_sigma_m.unwrap_or(position);
             // Rounded as one would write them.
             let arcsec = config
                 .rotation_sigma_rad
+                .unwrap_or(rotation)
                 .map(|sigma_rad| (sigma_rad / RADIANS_PER_ARCSECOND * 1e6).round() / 1e6);
             format!(
-                "adjustment.position_sigma_m = {:?} and rotation_sigma_arcsec = {arcsec:?}",
-                config.position_sigma_m
+                "adjustment.position_sigma_m = {position_m:?} and rotation_sigma_arcsec = {arcsec:?}"
             )
         }
         AdjustmentModel::Published => {

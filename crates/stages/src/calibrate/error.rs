@@ -30,7 +30,8 @@ pub enum CalibrateError {
         "cameras {first} and {second} have the same sensor, {sensor}; expected support data of different lines"
     )]
     #[cause(
-        "name_sensor distinguishes the lines of the camera: check the files in cameras.isd and validation.isd"
+        "name_sensor distinguishes the lines of the camera: check the files in cameras.isd and validation.isd; support \
+         data that ALE wrote from PDS labels do not distinguish lines, those of areograph do"
     )]
     SameSensor {
         /// A camera.

@@ -6,7 +6,7 @@ use super::{
     Evidence,
 };
 use crate::check_beam::{Beam, ImageBeam};
-use areograph_base::{minus::signed, terms::Terms, units::METRES_PER_KM};
+use areograph_base::{constants::SPACECRAFT, minus::signed, terms::Terms, units::METRES_PER_KM};
 use areograph_config::{AdjustmentConfig, MolaSurfaceConfig};
 use areograph_geom::statistics::BAARDA_LIMIT;
 
@@ -131,9 +131,9 @@ impl BeamEvidence<'_> {
             .find(|of| of.id == image.image);
         let of_camera = own.and_then(|image| image.rotation_rad);
         // About Y of the camera the beam moves along the track, about X across it.
-        let attitude_rad = of_camera.map_or([self.adjustment.rotation_sigma_rad[0]; 2], |sigmas| {
-            [sigmas[3], sigmas[0]]
-        });
+        // The beam tests images from the spacecraft of the laser only.
+        let usual_rad = self.adjustment.rotation_sigma_rad(&SPACECRAFT)[0];
+        let attitude_rad = of_camera.map_or([usual_rad; 2], |sigmas| [sigmas[3], sigmas[0]]);
         let plan_rad = self.surface.profile_plan_sigma_m / beam.range_m;
         attitude_rad.map(|rad| rad.hypot(plan_rad))
     }

@@ -2,7 +2,11 @@
 
 use serde::Serialize;
 
-use areograph_base::{constants::GROUND_SPEED_M_S, footprints::AdjustmentModel};
+use crate::site_image::SiteImage;
+use areograph_base::{
+    constants::{GROUND_SPEED_M_S, SPACECRAFT, Spacecraft},
+    footprints::AdjustmentModel,
+};
 use areograph_config::{AdjustmentConfig, SiteConfig};
 use areograph_store::stage::Round;
 
@@ -24,9 +28,14 @@ pub struct Margin {
 impl Margin {
     /// The margin of the site's images with the orientation from the kernels, or with the adjusted one.
     #[must_use]
-    pub fn of(site: &SiteConfig, round: Round) -> Self {
+    pub fn of(site: &SiteConfig, images: &[SiteImage], round: Round) -> Self {
         let config = &site.adjustment;
-        let images = site.images.iter().map(|image| sigmas(config, &image.id));
+        let images = site.images.iter().zip(images).map(|(image, of)| {
+            // Not known before the times of the image are; it is matched thereafter.
+            let times = of.times.get();
+            let spacecraft = times.map_or(*SPACECRAFT, |times| times.instrument.spacecraft);
+            sigmas(config, &image.id, spacecraft)
+        });
         Self {
             images: images.collect(),
             most_m: match round {
@@ -56,7 +65,7 @@ impl Margin {
 }
 
 /// Standard deviations of an image's position, metres, and of its pointing, radians, over all powers of time.
-fn sigmas(config: &AdjustmentConfig, image: &str) -> [f64; 2] {
+fn sigmas(config: &AdjustmentConfig, image: &str, spacecraft: &Spacecraft) -> [f64; 2] {
     let norm = |sigmas: &[f64]| sigmas.iter().map(|sigma| sigma * sigma).sum::<f64>().sqrt();
     let clocks_m = ATTITUDE_CLOCK_M_S
         * if config.attitude_clock {
@@ -67,8 +76,8 @@ fn sigmas(config: &AdjustmentConfig, image: &str) -> [f64; 2] {
     let times_m = GROUND_SPEED_M_S * config.time_bias_sigma_s;
     let [position_m, pointing_rad] = match config.model {
         AdjustmentModel::MolaSurface => [
-            norm(&config.position_sigma_m),
-            norm(&config.rotation_sigma_rad),
+            norm(&config.position_sigma_m(spacecraft)),
+            norm(&config.rotation_sigma_rad(spacecraft)),
         ],
         // Rotations move the ground as far, hence √2.
         AdjustmentModel::Published => {

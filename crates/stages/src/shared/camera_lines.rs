@@ -4,14 +4,15 @@ use std::sync::OnceLock;
 
 use nalgebra::Vector3;
 
-use super::line_camera::LineCamera;
+use super::{image_pixels::CLOCKS_APART_MAX_S, line_camera::LineCamera};
 use crate::calibrate::Calibration;
 use areograph_base::{
     body::Body,
     error::{Cause, Locate as _, Result},
 };
-use areograph_config::CameraConfig;
+use areograph_config::{CameraConfig, all_instruments};
 use areograph_pds::{
+    ImageLabel,
     isd::SupportSource,
     pixel_file::{PixelFile, Pyramid},
 };
@@ -134,6 +135,23 @@ enum PixelsError {
     },
     #[error("camera {camera}: its pixels are map-projected; expected the unprojected image")]
     Map { camera: String },
+    #[error(
+        "camera {camera}: its pixels belong to {found}; expected {expected}, the sensor of its support data"
+    )]
+    Sensor {
+        camera: String,
+        found: String,
+        expected: String,
+    },
+    #[error(
+        "camera {camera}: the exposure of its pixels begins at ET {found_s:.3} s; expected {expected_s:.3} s, as in its \
+         support data"
+    )]
+    Start {
+        camera: String,
+        found_s: f64,
+        expected_s: f64,
+    },
 }
 
 impl LinePixels {
@@ -163,7 +181,10 @@ impl LinePixels {
 
 /// The pixels of a line, which must cover its complete image.
 fn pixels_of(file: &HashedFile, line: &LineCamera) -> Result<Pyramid> {
-    let pixels = PixelFile::open(&file.path, &[])?;
+    let pixels = PixelFile::open(&file.path, all_instruments())?;
+    if let Some(label) = pixels.label() {
+        of_the_line(label, line).in_file(&file.path)?;
+    }
     let camera = line.camera.id.clone();
     let found = [pixels.lines(), pixels.samples()];
     let expected = [line.camera.line_times.lines(), line.samples];
@@ -179,4 +200,32 @@ fn pixels_of(file: &HashedFile, line: &LineCamera) -> Result<Pyramid> {
         return Err(wrong).in_file(&file.path);
     }
     Pyramid::of(&pixels)
+}
+
+/// Whether a label belongs to the image of a line. Support data may name a sensor that no label names.
+fn of_the_line(label: &ImageLabel, line: &LineCamera) -> std::result::Result<(), PixelsError> {
+    let found = label.instrument.sensor_name();
+    let is_known = |sensor: &str| {
+        let mut known = all_instruments().iter();
+        known.any(|camera| camera.sensor_name() == sensor)
+    };
+    if found != line.sensor && is_known(&line.sensor) {
+        return Err(PixelsError::Sensor {
+            camera: line.camera.id.clone(),
+            found: found.to_owned(),
+            expected: line.sensor.clone(),
+        });
+    }
+    let first = label.lines.as_ref().and_then(|rows| rows.pieces.first());
+    let expected = line.camera.line_times.start();
+    match first.map(|piece| piece.start) {
+        Some(found) if found.since(expected).abs() > f64::from(CLOCKS_APART_MAX_S) => {
+            Err(PixelsError::Start {
+                camera: line.camera.id.clone(),
+                found_s: found.seconds(),
+                expected_s: expected.seconds(),
+            })
+        }
+        _ => Ok(()),
+    }
 }

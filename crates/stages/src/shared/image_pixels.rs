@@ -23,7 +23,7 @@ use areograph_store::{
 };
 
 /// With a larger difference, the clocks of an image and of its pixels belong to two images, seconds; labels round them.
-const CLOCKS_APART_MAX_S: u32 = 1;
+pub(super) const CLOCKS_APART_MAX_S: u32 = 1;
 
 /// For every image of the site the file with its pixels, where there is one.
 #[derive(Debug, Clone, Copy)]

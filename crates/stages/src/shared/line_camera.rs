@@ -28,6 +28,8 @@ pub struct LineCamera {
     pub camera: OrientedCamera<SampledOrientation>,
     /// Samples of a line.
     pub samples: u32,
+    /// Name of the line in its support data.
+    pub sensor: String,
 }
 
 /// Support data that do not form an orientation, or one that sees no ground.
@@ -137,6 +139,7 @@ impl LineCamera {
                 line_times: support.line_times,
             },
             samples: support.samples,
+            sensor: support.instrument.name,
         })
     }
 }

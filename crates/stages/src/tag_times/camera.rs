@@ -10,13 +10,14 @@ const SCALE_TOLERANCE: f64 = 0.02;
 /// Pixels by which two files of one camera may place its boresight apart: one counts edges, another centres.
 const BORESIGHT_PX: f64 = 1.0;
 
-/// The known camera that a camera of support data names, by frame and number.
+/// The known camera that another names, by number, and by frame or its name in support data.
 pub(super) fn known_one<'a>(
     camera: &Instrument,
     known: &'a [Instrument],
 ) -> Option<&'a Instrument> {
     known.iter().find(|other| {
-        other.naif.frame == camera.naif.frame && other.naif.instrument == camera.naif.instrument
+        let names = [&*other.naif.frame, other.sensor_name()];
+        names.contains(&&*camera.naif.frame) && other.naif.instrument == camera.naif.instrument
     })
 }
 
@@ -71,6 +72,20 @@ mod tests {
     use super::*;
     use areograph_base::instruments::Sense;
     use areograph_config::{all_instruments, usual_instrument};
+
+    #[test]
+    fn support_data_of_every_camera_name_it_alone() {
+        for camera in all_instruments() {
+            let mut written = camera.clone();
+            camera.sensor_name().clone_into(&mut written.naif.frame);
+            written.naif.frame_id = written.naif.instrument;
+            let known = known_one(&written, all_instruments());
+            assert_eq!(known.map(|known| &known.id), Some(&camera.id));
+            let all = all_instruments().iter();
+            let named = all.filter(|other| other.sensor_name() == written.sensor_name());
+            assert_eq!(named.count(), 1, "{}", camera.id);
+        }
+    }
 
     #[test]
     fn a_mirrored_detector_is_reported_and_rounding_is_not() {
