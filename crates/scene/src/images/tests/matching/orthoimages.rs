@@ -197,7 +197,10 @@ impl Judged {
             number("/shared_sigma_m/0"),
             number("/shared_sigma_m/1"),
             number("/sigma_m"),
-            number("/jitter_m"),
+            // Omitted where no scatter was measured.
+            stated
+                .pointer("/jitter_m")
+                .map_or(0.0, |of| of.as_f64().unwrap()),
             number("/drift_m"),
         );
         assert!(errors_m.len() >= 30);
