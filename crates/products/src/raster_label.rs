@@ -22,8 +22,10 @@ impl Number for Label {
         numbers.clone().max_by_key(key).unwrap_or(Self::NONE)
     }
 
-    fn append(self, bytes: &mut Vec<u8>) {
-        bytes.push(self.0);
+    const PREDICTOR: usize = 1;
+
+    fn predicted(row: &[Self]) -> Vec<u8> {
+        row.iter().map(|of| of.0).collect()
     }
 }
 
