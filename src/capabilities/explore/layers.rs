@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::frame::MapFrame;
 use crate::{
+    capabilities::orthoimages::{best_mosaic, mosaic_before},
     error::Result,
     geom::height_grid::HeightGrid,
     products::SiteProducts,
@@ -13,10 +14,13 @@ use crate::{
     stages::{
         lay_overlays::{QuickLook, ShownImage},
         map_surface::Surface,
-        rectify_images::Orthoimage,
+        mosaic_images::Mosaic,
+        rectify_images::{Orthoimage, OrthoimageLook},
     },
 };
 
+/// Suffixes of the names and titles of pictures with the orientation from the kernels.
+const BEFORE: [&str; 2] = ["_before", ", before the adjustment"];
 /// Longest side of an overview, pixels, and of a tile.
 const OVERVIEW: usize = 1024;
 const TILE: usize = 2048;
@@ -117,12 +121,25 @@ pub(super) fn layers<'a>(site: &SiteProducts<'a>) -> Result<Vec<Layer<'a>>> {
     layers.extend(relief(site, &frame)?);
     let surface = site.find::<Surface>()?;
     layers.extend(surface.map(|surface| hillshade(&frame, &surface.model.heights)));
-    let orthoimages = site.find::<Vec<Orthoimage>>()?;
     let shown = site.shown_images();
     let is_shown = |image: usize| shown.binary_search(&image).is_ok();
-    let orthoimages = orthoimages.map_or(&[][..], Vec::as_slice);
-    let orthoimages = orthoimages.iter().filter(|of| is_shown(of.account.image));
-    layers.extend(orthoimages.map(|of| orthoimage(site, &frame, of)));
+    let before = Orthoimage::before(site.book)?;
+    for of in Orthoimage::best(site.book)? {
+        let image = of.account.image;
+        if is_shown(image) {
+            let before = before.iter().filter(|of| of.account.image == image);
+            layers.extend(before.map(|of| orthoimage(site, &frame, of, BEFORE)));
+            layers.push(orthoimage(site, &frame, of, ["", ""]));
+        }
+    }
+    // The map begins with the last two pictures: an image, or the mosaic, before and after the adjustment.
+    let mosaics = [
+        (mosaic_before(site)?, BEFORE),
+        (best_mosaic(site)?, ["", ""]),
+    ];
+    for (mosaic, when) in mosaics {
+        layers.extend(mosaic.map(|of| mosaic_layer(&frame, of, when)));
+    }
     let images = site.overlays.map_or(&[][..], |overlays| &overlays.images);
     let images = images.iter().filter(|shown| is_shown(shown.image));
     layers.extend(images.map(|shown| strip(site, shown)));
@@ -206,17 +223,38 @@ fn byte(share: f64) -> u8 {
     (1.0 + 254.0 * share.clamp(0.0, 1.0)).round() as u8
 }
 
-fn orthoimage<'a>(site: &SiteProducts, frame: &MapFrame, of: &'a Orthoimage) -> Layer<'a> {
+fn orthoimage<'a>(
+    site: &SiteProducts,
+    frame: &MapFrame,
+    of: &'a Orthoimage,
+    [suffix, when]: [&str; 2],
+) -> Layer<'a> {
     let id = &site.images[of.account.image].times.id;
+    let (account, look) = (&of.account, &of.account.look);
+    let name = format!("{id}_orthoimage{suffix}");
+    let title = format!("Orthoimage of {id}{when}");
+    on_map(frame, [name, title], (&account.map, &of.brightness), look)
+}
+
+fn mosaic_layer<'a>(frame: &MapFrame, of: &'a Mosaic, [suffix, when]: [&str; 2]) -> Layer<'a> {
+    let (account, look) = (&of.account, &of.account.look);
+    let names = [format!("mosaic{suffix}"), format!("Mosaic{when}")];
+    on_map(frame, names, (&account.map, &of.brightness), look)
+}
+
+/// A picture of the ground, with the tones of its look.
+fn on_map<'a>(
+    frame: &MapFrame,
+    [name, title]: [String; 2],
+    (grid, brightness): (&HeightGrid, &'a [u8]),
+    look: &OrthoimageLook,
+) -> Layer<'a> {
     Layer {
-        name: format!("{id}_orthoimage"),
-        title: format!("Orthoimage of {id}"),
-        place: LayerPlace::Map(edges_m(frame, &of.account.map)),
-        pixels: Pixels::Grey(
-            of.brightness.as_slice().into(),
-            stretch(&of.account.look.brightness),
-        ),
-        size: of.account.map.size,
+        name,
+        title,
+        place: LayerPlace::Map(edges_m(frame, grid)),
+        pixels: Pixels::Grey(brightness.into(), stretch(&look.brightness)),
+        size: grid.size,
     }
 }
 

@@ -7,6 +7,7 @@ mod mosaic;
 mod products;
 mod section;
 
+pub(super) use self::mosaic::{before as mosaic_before, best as best_mosaic};
 use super::Capability;
 use crate::products::ORTHOIMAGE_OFFSETS;
 

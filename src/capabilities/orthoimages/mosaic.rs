@@ -114,7 +114,7 @@ fn is_adjusted(site: &SiteProducts) -> bool {
 }
 
 /// The mosaic with the best orientation.
-pub(super) fn best<'a>(site: &SiteProducts<'a>) -> Result<Option<&'a Mosaic>> {
+pub(in crate::capabilities) fn best<'a>(site: &SiteProducts<'a>) -> Result<Option<&'a Mosaic>> {
     let round = if is_adjusted(site) {
         Round::Adjusted
     } else {
@@ -124,7 +124,7 @@ pub(super) fn best<'a>(site: &SiteProducts<'a>) -> Result<Option<&'a Mosaic>> {
 }
 
 /// The mosaic with the orientation from the kernels, in a site whose best orientation is the adjusted one.
-pub(super) fn before<'a>(site: &SiteProducts<'a>) -> Result<Option<&'a Mosaic>> {
+pub(in crate::capabilities) fn before<'a>(site: &SiteProducts<'a>) -> Result<Option<&'a Mosaic>> {
     let found = is_adjusted(site).then(|| of_round(site, Round::Initial));
     Ok(found.transpose()?.flatten())
 }
