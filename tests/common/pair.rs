@@ -1,7 +1,7 @@
 //! A small site of two or three images by support data with their pixels, and of the shots of passes over them in a table: seconds from
 //! pixels to products.
 
-use std::{fs, path::Path, process::Command, sync::atomic::AtomicBool};
+use std::{fmt::Write as _, fs, path::Path, process::Command, sync::atomic::AtomicBool};
 
 use areograph::{
     scene::{LineScene, write_line_scene},
@@ -59,9 +59,11 @@ fn write(folder: &Path, images: &[(&str, &str, u32)], surface: &str) {
         };
         let stop = AtomicBool::new(false);
         write_line_scene(&folder.join(name), &scene, Watch::from(&stop)).unwrap();
-        site.push_str(&format!(
-            "[[images]]\nid = \"{id}\"\nisd = \"{name}/isd/{id}.json\"\npixels = \"{name}/images/{id}.tif\"\n"
-        ));
+        writeln!(
+            site,
+            "[[images]]\nid = \"{id}\"\nisd = \"{name}/isd/{id}.json\"\npixels = \"{name}/images/{id}.tif\""
+        )
+        .unwrap();
     }
     let mut search: Command = areograph();
     search.args(["--quiet", "pedr", "search"]);
