@@ -500,7 +500,7 @@ fn labels_that_contradict_the_file_are_refused() {
         (
             "MACROPIXEL_SIZE              = 4",
             "MACROPIXEL_SIZE = UNK",
-            "no downtrack_summing",
+            "downtrack_summing is neither in the label nor in the configuration",
         ),
         (
             "PROCESSING_LEVEL_ID          = 2",

@@ -108,7 +108,7 @@ fn a_missing_sun_is_named() {
         "{told}"
     );
     assert!(
-        told.contains("with the Sun 687 to 834 s earlier, when the light left the Sun"),
+        told.contains("and the Sun 687 to 834 s earlier, when the light left the Sun"),
         "{told}"
     );
     assert!(!told.contains("SPKINSUFFDATA"), "{told}");
