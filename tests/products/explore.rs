@@ -175,20 +175,31 @@ fn values_are_those_of_the_tables() {
 
 /// The map of the small site with a terrain model of one height around its footprints, and an orthoimage.
 fn with_terrain<T>(folder: &Path, then: impl FnOnce(&SiteProducts) -> T) -> T {
+    let model = |footprints: &Footprints<BodyFixed>| SurfaceModel {
+        heights: level(footprints),
+        sigmas_m: vec![2.0; 4],
+        ..surface().model
+    };
+    with_surface(folder, (model, false), vec![orthoimage()], then)
+}
+
+/// The small site with this terrain model, which may be withheld, and orthoimages.
+fn with_surface<T>(
+    folder: &Path,
+    (model, is_refused): (impl Fn(&Footprints<BodyFixed>) -> SurfaceModel, bool),
+    orthoimages: Vec<Orthoimage>,
+    then: impl FnOnce(&SiteProducts) -> T,
+) -> T {
     Site::small().with(true, |site| {
         let mut book = site.book.clone();
-        let surface = Surface {
-            model: SurfaceModel {
-                heights: level(site.footprints),
-                sigmas_m: vec![2.0; 4],
-                ..surface().model
-            },
-            ..surface()
-        };
-        book.enter_heavy(Round::Initial, output(surface), Surface::without_model)
+        let Surface { mut account, .. } = surface();
+        account.is_refused = is_refused;
+        let model = model(site.footprints);
+        let surface = output(Surface { account, model });
+        book.enter_heavy(Round::Initial, surface, Surface::without_model)
             .unwrap();
         let shown = |of: &Vec<Orthoimage>| of.iter().map(Orthoimage::without_cells).collect();
-        book.enter_heavy(Round::Initial, output(vec![orthoimage()]), shown)
+        book.enter_heavy(Round::Initial, output(orthoimages), shown)
             .unwrap();
         let site = SiteProducts {
             book: &book,
@@ -197,6 +208,30 @@ fn with_terrain<T>(folder: &Path, then: impl FnOnce(&SiteProducts) -> T) -> T {
         write_products(folder, &site, "").unwrap();
         then(&site)
     })
+}
+
+#[test]
+fn a_withheld_terrain_model_without_cells_is_not_drawn() {
+    let folder = tempfile::tempdir().unwrap();
+    let empty = |footprints: &Footprints<BodyFixed>| SurfaceModel {
+        heights: HeightGrid {
+            size: [0, 0],
+            heights_m: Vec::new(),
+            ..level(footprints)
+        },
+        sigmas_m: Vec::new(),
+        parallel_rad: 0.0,
+        ..surface().model
+    };
+    with_surface(folder.path(), (empty, true), Vec::new(), |_| ());
+    let values = values(&page_of(folder.path()));
+    assert_eq!(values["terrain"], Value::Array(Vec::new()));
+    let layers = values["layers"].as_array().unwrap().iter();
+    let titles: Vec<&str> = layers.filter_map(|layer| layer["title"].as_str()).collect();
+    assert!(
+        !titles.iter().any(|title| title.contains("errain")),
+        "{titles:?}"
+    );
 }
 
 const HEIGHT_M: f32 = 100.0;

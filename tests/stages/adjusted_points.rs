@@ -488,7 +488,7 @@ fn ground_control_is_read_as_ames_stereo_pipeline_reads_it() {
             && text.contains("\n# 2 is ap19215-41-7\n")
     );
     assert!(
-        text.contains("# all points share an error of 103.0 m east, 108.0 m north and 1.8 m up")
+        text.contains("# all points share an error with standard deviations of 103.0 m east, 108.0 m north and 1.8 m up")
     );
     write_gcp(&folder.path().join("alone.gcp"), Body::Mars, None, &points).unwrap();
     let text = fs::read_to_string(folder.path().join("alone.gcp")).unwrap();

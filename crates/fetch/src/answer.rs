@@ -187,7 +187,7 @@ mod tests {
             "http://other.edu/a_pts_csv.csv"
         );
         let no_radii = files(&format!(r#"{{"URL": "https://{output}_topo_csv.csv"}}"#));
-        assert!(refusal(&no_radii).contains("no table with radii (*_pts_csv.csv), but https://"));
+        assert!(refusal(&no_radii).contains("; expected a table with radii (*_pts_csv.csv)"));
     }
 
     #[test]

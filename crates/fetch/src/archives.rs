@@ -370,8 +370,8 @@ mod tests {
             ("[kernels]\nurl = \"file:///mirror\"", "ends in a slash"),
             ("[kernels]\nindex = \"../x\"", "is not a path;"),
             ("[generic]\nlatest = [['..', '', '']]", "is not a path;"),
-            ("[network]\nattempts = 0", "attempts is 0"),
-            ("[network]\nread_s = nan", "outside 0.001"),
+            ("[network]\nattempts = 0", "attempts is below 1"),
+            ("[network]\nread_s = nan", "is not 0.001"),
             ("[kernel]\nurl = \"x/\"", "unknown field"),
             (
                 "[shots]\nurl = \"file:///mirror/livegds\"",

@@ -46,6 +46,7 @@ impl MapFrame {
             .map(|corner| (corner.longitude_rad, corner.latitude_rad));
         let middle = MapProjection::of_points(shots.chain(corners), radius_m);
         let surface = site.find::<Surface>()?;
+        let surface = surface.filter(|of| !of.account.is_refused);
         let parallel_rad = surface.map_or(middle.latitude_rad(), |of| of.model.parallel_rad);
         Ok(Self {
             middle_deg: [middle.longitude_rad(), middle.latitude_rad()]

@@ -120,6 +120,7 @@ pub(super) fn layers<'a>(site: &SiteProducts<'a>) -> Result<Vec<Layer<'a>>> {
     let mut layers = Vec::new();
     layers.extend(relief(site, &frame)?);
     let surface = site.find::<Surface>()?;
+    let surface = surface.filter(|of| !of.account.is_refused);
     layers.extend(surface.map(|surface| hillshade(&frame, &surface.model.heights)));
     let shown = site.shown_images();
     let is_shown = |image: usize| shown.binary_search(&image).is_ok();

@@ -28,7 +28,8 @@ pub(super) struct TerrainLine {
 /// # Errors
 /// A terrain model that cannot be read.
 pub(super) fn lines(site: &SiteProducts, profiles: &[Vec<usize>]) -> Result<Vec<TerrainLine>> {
-    let Some(surface) = site.find::<Surface>()? else {
+    let surface = site.find::<Surface>()?;
+    let Some(surface) = surface.filter(|of| !of.account.is_refused) else {
         return Ok(Vec::new());
     };
     let grid = &surface.model.heights;

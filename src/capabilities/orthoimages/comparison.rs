@@ -90,8 +90,13 @@ fn table(pairs: &[Pair<'_>]) -> Markup {
         ],
     );
     for (index, pair) in pairs.iter().enumerate() {
+        let before = if pair.after.is_some() {
+            "before the adjustment"
+        } else {
+            "from the kernels"
+        };
         let states = [
-            ("before", "before the adjustment", &pair.before),
+            ("before", before, &pair.before),
             ("after", "after the adjustment", &pair.after),
         ];
         for (name, words, of) in states {

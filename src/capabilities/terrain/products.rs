@@ -1,4 +1,4 @@
-//! The terrain model of a pair of images: heights, their standard deviations, and statistics.
+//! The terrain model of a site: heights, their standard deviations, and statistics.
 
 use std::path::Path;
 

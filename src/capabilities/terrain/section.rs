@@ -1,4 +1,4 @@
-//! The terrain model of a pair of images: statistics, comparison with MOLA, and pictures.
+//! The terrain model of a site: statistics, comparison with MOLA, and pictures.
 
 use maud::{Markup, html};
 

@@ -13,7 +13,10 @@ mod offsets;
 #[cfg(test)]
 mod tests;
 
-use std::sync::atomic::AtomicBool;
+use std::{
+    cmp::Reverse,
+    sync::atomic::{AtomicBool, Ordering},
+};
 
 use self::{
     lattice::{Lattice, OnLattice},
@@ -27,7 +30,7 @@ use super::{
         SurfaceAccount, SurfaceModel,
     },
 };
-use areograph_base::error::{Cause, Result};
+use areograph_base::error::{Cause, Result, Stopped};
 use areograph_config::MolaSurfaceConfig;
 use areograph_geom::{height_grid::HeightGrid, statistics::Summary};
 use areograph_store::{
@@ -60,14 +63,14 @@ stage_inputs! {
 #[cause(Input)]
 enum JoinError {
     #[error("no pair of images gives a terrain model")]
-    #[cause("check the kernels and times of the images, and that two of them show the same ground")]
+    #[cause(
+        "check the kernels and times of the images, that two of them show the same ground, and that surface.cell_m suits \
+         their pixels; name two images in surface.images for the reason"
+    )]
     Nothing,
     #[error("the terrain models of all pairs cover {cells} cells; expected at most {}", 1 << 24)]
     #[cause("increase surface.cell_m, or name two images in surface.images")]
     TooLarge { cells: usize },
-    #[error("{pairs} pairs of images have a terrain model; expected at most {PAIRS_MAX}")]
-    #[cause("divide the images among several sites, or name two images in surface.images")]
-    TooMany { pairs: usize },
 }
 
 impl Stage for JoinSurfaces<'_> {
@@ -77,10 +80,14 @@ impl Stage for JoinSurfaces<'_> {
     type Output = Surface;
     stage_inputs!(fingerprint);
 
-    fn run(&self, _: &AtomicBool) -> Result<Surface> {
+    fn run(&self, stop: &AtomicBool) -> Result<Surface> {
         let surfaces = self.surfaces.0.iter().map(Output::value);
         let surfaces: Vec<&Surface> = surfaces.collect::<Result<_>>()?;
-        let mut joined = joined(&surfaces)?;
+        let mut joined = joined(&surfaces, stop)?;
+        Stopped::check(stop)?;
+        if joined.account.is_refused {
+            return Ok(joined);
+        }
         let footprints = &self.converted.value()?.footprints;
         let options = self.laser_surface.options(footprints.body);
         let profiles = self.profiles.value()?;
@@ -97,14 +104,15 @@ struct Part<'a> {
     cells: OnLattice,
 }
 
-/// The joined model, without shots and areoid.
-fn joined(surfaces: &[&Surface]) -> std::result::Result<Surface, JoinError> {
-    let used: Vec<usize> = (0..surfaces.len())
+/// The joined model, without shots and areoid; incomplete if `stop` is set.
+fn joined(surfaces: &[&Surface], stop: &AtomicBool) -> std::result::Result<Surface, JoinError> {
+    let mut used: Vec<usize> = (0..surfaces.len())
         .filter(|index| !surfaces[*index].account.is_refused)
         .collect();
-    if used.len() > PAIRS_MAX {
-        return Err(JoinError::TooMany { pairs: used.len() });
-    }
+    // The pairs with most heights, in their order.
+    used.sort_by_key(|index| Reverse(surfaces[*index].account.filled));
+    used.truncate(PAIRS_MAX);
+    used.sort_unstable();
     if used.is_empty() {
         return withheld(surfaces);
     }
@@ -117,7 +125,7 @@ fn joined(surfaces: &[&Surface]) -> std::result::Result<Surface, JoinError> {
             cells: lattice.take(&surfaces[*index].model),
         })
         .collect();
-    let mut seams = seams(&parts, lattice.grid.size);
+    let mut seams = seams(&parts, lattice.grid.size, stop);
     let known: Vec<Known> = parts.iter().map(known).collect();
     let measured: Vec<([usize; 2], Offset)> = seams
         .iter()
@@ -202,10 +210,13 @@ fn known(part: &Part) -> Known {
 }
 
 /// Differences in the overlaps of all models, before the adjustment of their offsets.
-fn seams(parts: &[Part], [rows, columns]: [usize; 2]) -> Vec<Seam> {
+fn seams(parts: &[Part], [rows, columns]: [usize; 2], stop: &AtomicBool) -> Vec<Seam> {
     let mut seams = Vec::new();
     for (first, one) in parts.iter().enumerate() {
         for (second, other) in parts.iter().enumerate().skip(first + 1) {
+            if stop.load(Ordering::Relaxed) {
+                return seams;
+            }
             let mut cells = Vec::new();
             for row in 0..rows {
                 for column in 0..columns {
@@ -365,15 +376,15 @@ fn of_all(used: &[&SurfaceAccount], surfaces: &[&Surface]) -> SurfaceAccount {
     all.aside_m = mean(&|of| of.aside_m.abs());
     (all.cells, all.filled) = (0, 0);
     all.unfilled.clear();
-    for Surface { account, .. } in surfaces {
-        all.cells += account.cells;
-        all.filled += if account.is_refused {
-            0
-        } else {
-            account.filled
-        };
+    // Pairs without a model count only if no pair has one.
+    let is_refused = surfaces.iter().all(|of| of.account.is_refused);
+    let counted = surfaces.iter().map(|of| &of.account);
+    for account in counted.filter(|of| is_refused || !of.is_refused) {
+        all.cells = all.cells.saturating_add(account.cells);
+        all.filled = all.filled.saturating_add(account.filled);
         for (why, count) in &account.unfilled {
-            *all.unfilled.entry(*why).or_insert(0) += count;
+            let all = all.unfilled.entry(*why).or_insert(0);
+            *all = all.saturating_add(*count);
         }
     }
     all

@@ -156,7 +156,11 @@ fn pairs(is_between: bool) -> [Invented; 3] {
 fn of_pairs(pairs: &[Invented], seed: u64) -> Surface {
     let errors = Errors::new(seed);
     let surfaces: Vec<Surface> = pairs.iter().map(|of| surface(of, &errors)).collect();
-    joined(&surfaces.iter().collect::<Vec<_>>()).expect("the models can be joined")
+    joined(
+        &surfaces.iter().collect::<Vec<_>>(),
+        &AtomicBool::new(false),
+    )
+    .expect("the models can be joined")
 }
 
 /// Level of the site: the mean of the offsets by numbers of heights, metres.
@@ -255,7 +259,11 @@ fn pairs_without_a_model_take_no_part() {
     let invented = pairs(true);
     let mut surfaces: Vec<Surface> = invented.iter().map(|of| surface(of, &errors)).collect();
     surfaces[0].account.is_refused = true;
-    let found = joined(&surfaces.iter().collect::<Vec<_>>()).expect("two pairs are left");
+    let found = joined(
+        &surfaces.iter().collect::<Vec<_>>(),
+        &AtomicBool::new(false),
+    )
+    .expect("two pairs are left");
     let joint = found.account.joint.expect("several pairs");
     let bits: Vec<Option<u32>> = joint.pairs.iter().map(|of| of.bit).collect();
     assert_eq!(bits, [None, Some(0), Some(1)]);
@@ -264,12 +272,19 @@ fn pairs_without_a_model_take_no_part() {
     for surface in &mut surfaces {
         surface.account.is_refused = true;
     }
-    let none = joined(&surfaces.iter().collect::<Vec<_>>()).expect("a withheld model");
+    let none = joined(
+        &surfaces.iter().collect::<Vec<_>>(),
+        &AtomicBool::new(false),
+    )
+    .expect("a withheld model");
     assert!(none.account.is_refused && none.model.heights.heights_m.is_empty());
     for surface in &mut surfaces {
         surface.account.cells = 0;
     }
-    let nothing = joined(&surfaces.iter().collect::<Vec<_>>());
+    let nothing = joined(
+        &surfaces.iter().collect::<Vec<_>>(),
+        &AtomicBool::new(false),
+    );
     assert!(matches!(nothing, Err(JoinError::Nothing)));
 }
 

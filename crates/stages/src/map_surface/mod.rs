@@ -32,7 +32,7 @@ mod tests;
 use std::{collections::BTreeMap, sync::atomic::AtomicBool};
 
 use self::{
-    common::{Common, PairError},
+    common::Common,
     jitter::{JitterAndSmoothing, Sizes},
     levels::all_levels,
 };
@@ -151,15 +151,26 @@ impl Stage for MapSurface<'_> {
         let oriented = self.images.oriented()?;
         let times = self.images.0.iter().map(|image| image.times.value());
         let times: Vec<&ImageTimes> = times.collect::<Result<_>>()?;
-        let pixels = self.pixels.decoded(&times)?;
+        let pair = self.pair(&times)?;
+        let adjusted = self.adjusted.0.map(Output::value).transpose()?;
+        let withheld = || Ok(Surface::withheld([pair[0], pair[1]], *self.cell_m));
+        let is_tied = |image: &usize| adjusted.is_none_or(|of| of.is_tied(*image));
+        // The error of an image without tie points is not that of the adjustment, and would displace all pairs.
+        if *self.is_of_all && !pair.iter().all(is_tied) {
+            return withheld();
+        }
+        let pixels = self.pixels.decoded_among(&times, &pair)?;
         let mut views = Vec::new();
-        for index in self.pair(&times)? {
+        for &index in &pair {
             if let Some(pixels) = &pixels[index] {
-                let view = View::of(&oriented[index], pixels).map_err(|unseen| {
-                    let image = times[index].id.clone();
-                    SurfaceError::Unseen { image, unseen }
-                })?;
-                views.push((index, view));
+                match View::of(&oriented[index], pixels) {
+                    Ok(view) => views.push((index, view)),
+                    Err(_) if *self.is_of_all => return withheld(),
+                    Err(unseen) => {
+                        let image = times[index].id.clone();
+                        return Err(SurfaceError::Unseen { image, unseen }.into());
+                    }
+                }
             }
         }
         let [(first, one), (second, other)] = &views[..] else {
@@ -175,17 +186,12 @@ impl Stage for MapSurface<'_> {
         };
         let common = Common::of([one, other], options.body, &heights, options.cell_m);
         let common = match common {
-            Err(PairError::NothingInCommon { .. } | PairError::Parallel { .. })
-                if *self.is_of_all =>
-            {
-                return Ok(Surface::withheld([*first, *second], *self.cell_m));
-            }
+            Err(_) if *self.is_of_all => return withheld(),
             common => common?,
         };
         let mut surface = of_ground(&common, [one, other], &heights, &options, watch)?;
         let account = &mut surface.account;
         account.images = [*first, *second];
-        let adjusted = self.adjusted.0.map(Output::value).transpose()?;
         let of_heights = adjusted.and_then(|adjusted| adjusted.heights.as_ref());
         account.common_sigma_m = of_heights.map(|of| of.mean_sigma_m[2]);
         account.shots_take_part = of_heights.is_some();

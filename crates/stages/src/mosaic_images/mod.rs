@@ -179,6 +179,9 @@ impl Stage for MosaicImages<'_> {
 
     fn run_watched(&self, watch: Watch<'_>) -> Result<Option<Mosaic>> {
         let orthoimages = self.orthoimages.value()?;
+        if orthoimages.is_empty() {
+            return Ok(None);
+        }
         let surface = self.surface.value()?;
         let look = &surface.account.look.heights;
         let known = look.heights_m.iter().filter(|of| !of.is_nan());

@@ -83,9 +83,25 @@ impl PixelFiles<'_> {
     /// # Errors
     /// As [`Self::of_distinct_images`]; errors in writing temporary files.
     pub fn decoded(&self, times: &[&ImageTimes]) -> Result<Vec<Option<Pyramid>>> {
+        let all: Vec<usize> = (0..times.len()).collect();
+        self.decoded_among(times, &all)
+    }
+
+    /// As [`Self::decoded`], of these images alone.
+    ///
+    /// # Errors
+    /// As [`Self::decoded`].
+    pub fn decoded_among(
+        &self,
+        times: &[&ImageTimes],
+        images: &[usize],
+    ) -> Result<Vec<Option<Pyramid>>> {
         let opened = self.of_distinct_images(times)?;
-        let decode = |file: &Option<PixelFile>| file.as_ref().map(Pyramid::of).transpose();
-        opened.par_iter().map(decode).collect()
+        let decode = |(index, file): (usize, &Option<PixelFile>)| {
+            let file = file.as_ref().filter(|_| images.contains(&index));
+            file.map(Pyramid::of).transpose()
+        };
+        opened.par_iter().enumerate().map(decode).collect()
     }
 
     /// Every file whose image has its times, and the result of opening it.

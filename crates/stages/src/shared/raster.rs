@@ -153,8 +153,12 @@ impl Reduced {
             }
         }
         let [a, b, aa, bb, ab] = sums.map(|sum| sum / count.max(1) as f64);
-        let spread = ((aa - a * a) * (bb - b * b)).max(f64::MIN_POSITIVE).sqrt();
-        (count, (ab - a * b) / spread)
+        let variances = [aa - a * a, bb - b * b];
+        // Squares of grey values: below, an image without contrast correlates with nothing.
+        if variances.iter().any(|of| *of < 1e-6) {
+            return (count, 0.0);
+        }
+        (count, (ab - a * b) / (variances[0] * variances[1]).sqrt())
     }
 }
 
