@@ -380,7 +380,7 @@ def test_a_product_that_the_site_lacks_is_refused_with_its_requirement(edited: C
         result.table("ties")
     with pytest.raises(InputError, match=r"adjusted_isd\.json; expected a site with an adjustment"):
         result.isd(result.images[0], adjusted=True)
-    with pytest.raises(InputError, match=r"surface\.tif; expected a site with a terrain model.*\[surface\]"):
+    with pytest.raises(InputError, match=r"surface_above_sphere\.tif; expected a site with a terrain model.*\[surface\]"):
         _ = result.terrain
     with pytest.raises(InputError, match=r"has no adjusted\.tm; expected a site with an adjustment"):
         result.path("adjusted.tm")
