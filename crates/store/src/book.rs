@@ -185,6 +185,30 @@ impl Book {
         self.output(round)?.map(Output::value).transpose()
     }
 
+    /// The value with the best orientation: of the adjusted round if it was entered there, else of the round of the kernels.
+    ///
+    /// # Errors
+    /// As [`Book::find`].
+    pub fn find_best<T: Entered>(&self) -> Result<Option<&T>> {
+        self.find(if self.has::<T>(Round::Adjusted) {
+            Round::Adjusted
+        } else {
+            Round::Initial
+        })
+    }
+
+    /// The value with the orientation from the kernels, if there is also one with the adjusted orientation.
+    ///
+    /// # Errors
+    /// As [`Book::find`].
+    pub fn find_before<T: Entered>(&self) -> Result<Option<&T>> {
+        let is_before = self.has::<T>(Round::Adjusted);
+        Ok(is_before
+            .then(|| self.find(Round::Initial))
+            .transpose()?
+            .flatten())
+    }
+
     /// The value of an output that every site has, in the round of the kernels.
     ///
     /// # Errors

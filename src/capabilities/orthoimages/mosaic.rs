@@ -10,7 +10,6 @@ use crate::{
     error::Result,
     products::{Content, Context, Declaration, Label, Role, SiteProducts, Write, write_json},
     schema::DocumentSchema,
-    stage::Round,
     stages::mosaic_images::{Mosaic, MosaicAccount},
 };
 
@@ -102,31 +101,16 @@ pub(super) static DOCUMENT: Declaration = Declaration {
     uses: &[],
 };
 
-/// The mosaic with the orientation of this round.
-fn of_round<'a>(site: &SiteProducts<'a>, round: Round) -> Result<Option<&'a Mosaic>> {
-    let found = site.book.find::<Option<Mosaic>>(round)?;
-    Ok(found.and_then(Option::as_ref))
-}
-
-/// Whether the mosaic of a site has the adjusted orientation.
-fn is_adjusted(site: &SiteProducts) -> bool {
-    site.book.has::<Option<Mosaic>>(Round::Adjusted)
-}
-
 /// The mosaic with the best orientation.
 pub(in crate::capabilities) fn best<'a>(site: &SiteProducts<'a>) -> Result<Option<&'a Mosaic>> {
-    let round = if is_adjusted(site) {
-        Round::Adjusted
-    } else {
-        Round::Initial
-    };
-    of_round(site, round)
+    let found = site.book.find_best::<Option<Mosaic>>()?;
+    Ok(found.and_then(Option::as_ref))
 }
 
 /// The mosaic with the orientation from the kernels, in a site whose best orientation is the adjusted one.
 pub(in crate::capabilities) fn before<'a>(site: &SiteProducts<'a>) -> Result<Option<&'a Mosaic>> {
-    let found = is_adjusted(site).then(|| of_round(site, Round::Initial));
-    Ok(found.transpose()?.flatten())
+    let found = site.book.find_before::<Option<Mosaic>>()?;
+    Ok(found.and_then(Option::as_ref))
 }
 
 /// Whether a site has a mosaic. The writer reports an output that cannot be read, here and below.

@@ -81,9 +81,7 @@ impl Orthoimage {
     /// # Errors
     /// An output that is not known or cannot be read.
     pub fn best(book: &Book) -> Result<&[Self]> {
-        let adjusted = book.find::<Vec<Self>>(Round::Adjusted)?;
-        let found = adjusted.map_or_else(|| book.find(Round::Initial), |of| Ok(Some(of)))?;
-        Ok(found.map_or(&[], Vec::as_slice))
+        Ok(book.find_best::<Vec<Self>>()?.map_or(&[], Vec::as_slice))
     }
 
     /// Those with the orientation from the kernels, in a site whose best orientation is the adjusted one; empty if it requests
@@ -92,10 +90,7 @@ impl Orthoimage {
     /// # Errors
     /// As [`Self::best`].
     pub fn before(book: &Book) -> Result<&[Self]> {
-        let found = book
-            .has::<Vec<Self>>(Round::Adjusted)
-            .then(|| book.find::<Vec<Self>>(Round::Initial));
-        Ok(found.transpose()?.flatten().map_or(&[], Vec::as_slice))
+        Ok(book.find_before::<Vec<Self>>()?.map_or(&[], Vec::as_slice))
     }
 
     /// Its statistics, which a page shows.
