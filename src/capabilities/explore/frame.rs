@@ -5,10 +5,10 @@ use std::f64::consts::FRAC_PI_2;
 use serde::Serialize;
 
 use crate::{
+    capabilities::terrain::significant_surface,
     error::Result,
     geom::map_projection::MapProjection,
     products::SiteProducts,
-    stages::map_surface::Surface,
     units::{RADIANS_PER_DEGREE, wrap_pi},
 };
 
@@ -45,8 +45,7 @@ impl MapFrame {
             .flatten()
             .map(|corner| (corner.longitude_rad, corner.latitude_rad));
         let middle = MapProjection::of_points(shots.chain(corners), radius_m);
-        let surface = site.find::<Surface>()?;
-        let surface = surface.filter(|of| !of.account.is_refused);
+        let surface = significant_surface(site)?;
         let parallel_rad = surface.map_or(middle.latitude_rad(), |of| of.model.parallel_rad);
         Ok(Self {
             middle_deg: [middle.longitude_rad(), middle.latitude_rad()]

@@ -6,14 +6,16 @@ use serde::Serialize;
 
 use super::frame::MapFrame;
 use crate::{
-    capabilities::orthoimages::{best_mosaic, mosaic_before},
+    capabilities::{
+        orthoimages::{best_mosaic, mosaic_before},
+        terrain::significant_surface,
+    },
     error::Result,
     geom::height_grid::HeightGrid,
     products::SiteProducts,
     report::parts::{relief_of_shots, round_length_m, shade},
     stages::{
         lay_overlays::{QuickLook, ShownImage},
-        map_surface::Surface,
         mosaic_images::Mosaic,
         rectify_images::{Orthoimage, OrthoimageLook},
     },
@@ -61,7 +63,7 @@ pub(super) enum Pixels<'a> {
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct Part {
     pub(super) file: String,
-    /// First and last row and column, the last ones excluded.
+    /// First and last row and column, the last ones excluded; those of an overview may lie beyond the layer.
     pub(super) rows: [usize; 2],
     pub(super) columns: [usize; 2],
     /// Rows and columns of the layer that are one pixel.
@@ -80,7 +82,11 @@ impl Layer<'_> {
             step,
         };
         let longest = rows.max(columns);
-        let whole = |step| part(String::new(), [0, rows], [0, columns], step);
+        // A whole number of squares, so that the pixels of an overview keep their size at its last edges.
+        let whole = |step: usize| {
+            let [rows, columns] = [rows, columns].map(|of: usize| of.next_multiple_of(step));
+            part(String::new(), [0, rows], [0, columns], step)
+        };
         if longest <= TILE || matches!(self.pixels, Pixels::Png(_)) {
             return vec![whole(1)];
         }
@@ -119,8 +125,7 @@ pub(super) fn layers<'a>(site: &SiteProducts<'a>) -> Result<Vec<Layer<'a>>> {
     let frame = MapFrame::of(site)?;
     let mut layers = Vec::new();
     layers.extend(relief(site, &frame)?);
-    let surface = site.find::<Surface>()?;
-    let surface = surface.filter(|of| !of.account.is_refused);
+    let surface = significant_surface(site)?;
     layers.extend(surface.map(|surface| hillshade(&frame, &surface.model.heights)));
     let shown = site.shown_images();
     let is_shown = |image: usize| shown.binary_search(&image).is_ok();

@@ -29,10 +29,11 @@ impl Layer<'_> {
         let ([top, bottom], [left, right], step) = (part.rows, part.columns, part.step);
         let width = (right - left).div_ceil(step);
         let mut reduced = Vec::with_capacity(width * (bottom - top).div_ceil(step));
+        let known = [bottom.min(self.size[0]), right.min(self.size[1])];
         for first in (top..bottom).step_by(step) {
             let mut sums = vec![(0_u32, 0_u32); width];
-            for row in first..bottom.min(first + step) {
-                let row = &pixels[row * self.size[1] + left..row * self.size[1] + right];
+            for row in first..known[0].min(first + step) {
+                let row = &pixels[row * self.size[1] + left..row * self.size[1] + known[1]];
                 for ((sum, count), square) in sums.iter_mut().zip(row.chunks(step)) {
                     for pixel in square.iter().filter(|pixel| **pixel > 0) {
                         *sum += u32::from(*pixel);
@@ -91,7 +92,7 @@ mod tests {
         let part = Part {
             file: String::new(),
             rows: [0, 2],
-            columns: [0, 3],
+            columns: [0, 4],
             step: 2,
         };
         let file = layer.png(&part).unwrap();

@@ -4,8 +4,8 @@ use serde::Serialize;
 
 use super::columns::Packed;
 use crate::{
-    error::Result, geom::height_grid::HeightGrid, products::SiteProducts,
-    stages::map_surface::Surface, units::wrap_pi,
+    capabilities::terrain::significant_surface, error::Result, geom::height_grid::HeightGrid,
+    products::SiteProducts, units::wrap_pi,
 };
 
 /// Samples of the terrain model from one footprint to the next: 40 m where footprints are 300 m apart.
@@ -28,8 +28,7 @@ pub(super) struct TerrainLine {
 /// # Errors
 /// A terrain model that cannot be read.
 pub(super) fn lines(site: &SiteProducts, profiles: &[Vec<usize>]) -> Result<Vec<TerrainLine>> {
-    let surface = site.find::<Surface>()?;
-    let Some(surface) = surface.filter(|of| !of.account.is_refused) else {
+    let Some(surface) = significant_surface(site)? else {
         return Ok(Vec::new());
     };
     let grid = &surface.model.heights;

@@ -116,11 +116,17 @@ pub(super) static DOCUMENT: Declaration = Declaration {
 /// Sites with these products.
 pub(super) const WITH_A_MODEL: &str = "a site with a terrain model";
 
+/// The terrain model of a site with its statistics, where enough cells matched.
+pub(in crate::capabilities) fn significant_surface<'a>(
+    site: &SiteProducts<'a>,
+) -> Result<Option<&'a Surface>> {
+    let surface = site.find::<Surface>()?;
+    Ok(surface.filter(|surface| !surface.account.is_refused))
+}
+
 /// The terrain model of a site, where enough cells matched.
 pub(super) fn significant<'a>(site: &SiteProducts<'a>) -> Result<Option<&'a SurfaceModel>> {
-    let surface = site.find::<Surface>()?;
-    let significant = surface.filter(|surface| !surface.account.is_refused);
-    Ok(significant.map(|surface| &surface.model))
+    Ok(significant_surface(site)?.map(|surface| &surface.model))
 }
 
 /// Whether the site has one. The writer reports an output that cannot be read.

@@ -2,7 +2,7 @@
 
 use super::{
     contour_interval::contour_interval_m,
-    products::{Band, WITH_A_MODEL, has_model, reference_file, write_raster},
+    products::{Band, WITH_A_MODEL, has_model, reference_file, significant_surface, write_raster},
 };
 use crate::{
     error::Result,
@@ -125,9 +125,7 @@ struct Relief<'a> {
 
 impl<'a> Relief<'a> {
     fn of(site: &SiteProducts<'a>) -> Result<Option<Self>> {
-        let surface = site.find::<Surface>()?;
-        let surface = surface.filter(|surface| !surface.account.is_refused);
-        Ok(surface.map(|surface| {
+        Ok(significant_surface(site)?.map(|surface| {
             let grid = surface.account.above_reference(&surface.model.heights);
             let above = reference_file(site).map_or("map sphere", |(above, _)| above);
             Self {
