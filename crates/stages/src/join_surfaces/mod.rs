@@ -68,6 +68,11 @@ enum JoinError {
          their pixels; name two images in surface.images for the reason"
     )]
     Nothing,
+    #[error(
+        "the offsets of the terrain models are not determined: a height or a standard deviation is not finite"
+    )]
+    #[cause(Bug: "report this with the configuration of the site and the log")]
+    Undetermined,
     #[error("the terrain models of all pairs cover {cells} cells; expected at most {}", 1 << 24)]
     #[cause("increase surface.cell_m, or name two images in surface.images")]
     TooLarge { cells: usize },
@@ -134,7 +139,7 @@ fn joined(surfaces: &[&Surface], stop: &AtomicBool) -> std::result::Result<Surfa
             (seam.pairs, Offset { offset_m, sigma_m })
         })
         .collect();
-    let levels = Levels::of(&known, &measured);
+    let levels = Levels::of(&known, &measured).ok_or(JoinError::Undetermined)?;
     for seam in &mut seams {
         let [one, other] = seam.pairs.map(|pair| levels.offsets_m[pair]);
         seam.after_m = seam.before_m - (one - other);

@@ -86,7 +86,9 @@ pub(super) struct Levels {
 impl Levels {
     /// By least squares, from `seams`: indices of two models, and the first above the second. The altimeter has one offset
     /// from all models, so that it determines differences between models only.
-    pub(super) fn of(models: &[Known], seams: &[([usize; 2], Offset)]) -> Self {
+    ///
+    /// `None` for numbers that are not finite.
+    pub(super) fn of(models: &[Known], seams: &[([usize; 2], Offset)]) -> Option<Self> {
         let count = models.len();
         let mut equations = Equations::new(count + 1);
         let total: f64 = models.iter().map(|model| f64::from(model.cells)).sum();
@@ -134,11 +136,11 @@ impl Levels {
                 sigma_m,
             },
         );
-        let (offsets_m, covariance_m2) = equations.solved();
-        Self {
+        let (offsets_m, covariance_m2) = equations.solved()?;
+        Some(Self {
             offsets_m: offsets_m.iter().take(count).copied().collect(),
             covariance_m2: covariance_m2.view((0, 0), (count, count)).into_owned(),
-        }
+        })
     }
 }
 
@@ -157,18 +159,16 @@ impl Equations {
 
     fn observe(&mut self, of: &[f64], Offset { offset_m, sigma_m }: Offset) {
         let of = DVector::from_column_slice(of);
-        let weight = sigma_m.powi(-2);
+        // No offset is known better than the level, which keeps the weights finite.
+        let weight = sigma_m.max(LEVEL_SIGMA_M).powi(-2);
         self.normals += weight * &of * of.transpose();
         self.right += weight * offset_m * of;
     }
 
-    fn solved(self) -> (DVector<f64>, DMatrix<f64>) {
-        let unknowns = self.right.len();
-        // Every unknown has an observation of its own, so that the matrix is positive definite.
-        self.normals.cholesky().map_or_else(
-            || (DVector::zeros(unknowns), DMatrix::zeros(unknowns, unknowns)),
-            |factor| (factor.solve(&self.right), factor.inverse()),
-        )
+    /// Every unknown has an observation of its own, so that the matrix of finite numbers is positive definite.
+    fn solved(self) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        let factor = self.normals.cholesky()?;
+        Some((factor.solve(&self.right), factor.inverse()))
     }
 }
 
@@ -197,7 +197,7 @@ mod tests {
             known(Some(offset(30.0, 0.5))),
         ];
         let seams = [([0, 1], offset(8.0, 0.1))];
-        let levels = Levels::of(&models, &seams);
+        let levels = Levels::of(&models, &seams).expect("finite numbers");
         // Between observation and the a priori level, metres.
         for (found_m, expected_m) in levels.offsets_m.iter().zip([4.0, -4.0, 0.0]) {
             assert!((found_m - expected_m).abs() < 0.1, "{:?}", levels.offsets_m);
