@@ -296,7 +296,7 @@ fn image_times(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
         };
         remarks.push(part.on_first_pixel(&image.id, tells_lines)?.into());
     }
-    remarks.extend(camera_agrees(&instrument, all_instruments()));
+    remarks.extend(camera_agrees(&instrument, false, all_instruments()));
     of_one_clock(image, instrument.spacecraft, fields.sclk_start.as_deref())?;
     let stated_start = start_time(image, &fields, session, &mut notes, &mut remarks)?;
     let pieces = Pieces {

@@ -22,11 +22,21 @@ pub(super) fn known_one<'a>(
 }
 
 /// A remark on a camera with the frame of a known one, but another geometry: kernels cannot show a mirrored detector.
-pub(super) fn camera_agrees(camera: &Instrument, known: &[Instrument]) -> Option<Disagreement> {
+/// A calibrated camera may have another boresight.
+pub(super) fn camera_agrees(
+    camera: &Instrument,
+    is_calibrated: bool,
+    known: &[Instrument],
+) -> Option<Disagreement> {
     let other = known_one(camera, known)?;
     let pixel_rad = |of: &Instrument| of.optics.pixel_pitch_mm / of.optics.focal_length_mm;
     let scale = pixel_rad(camera) / pixel_rad(other);
-    let apart_px = |of: fn(&Instrument) -> f64| (of(camera) - of(other)).abs();
+    let apart_px = |of: fn(&Instrument) -> f64| {
+        if is_calibrated {
+            return 0.0;
+        }
+        (of(camera) - of(other)).abs()
+    };
     let across_px = apart_px(|of| of.detector.boresight_px);
     let along_px = apart_px(|of| of.detector.along_track_px);
     let is_mirrored = camera.detector.samples_along != other.detector.samples_along;
@@ -91,7 +101,7 @@ mod tests {
     fn a_mirrored_detector_is_reported_and_rounding_is_not() {
         for camera in all_instruments() {
             assert_eq!(
-                camera_agrees(camera, all_instruments()),
+                camera_agrees(camera, false, all_instruments()),
                 None,
                 "{}",
                 camera.id
@@ -100,7 +110,7 @@ mod tests {
         let remark = |change: fn(&mut Instrument)| {
             let mut camera = usual_instrument().clone();
             change(&mut camera);
-            camera_agrees(&camera, all_instruments())
+            camera_agrees(&camera, false, all_instruments())
         };
         let mirrored = remark(|camera| camera.detector.samples_along = Sense::MinusY).unwrap();
         let expected = "differs in detector.samples_along from";
@@ -113,6 +123,19 @@ mod tests {
         assert_eq!(remark(|camera| camera.optics.pixel_pitch_mm *= 0.99), None);
         assert!(remark(|camera| camera.optics.focal_length_mm *= 1.1).is_some());
         assert!(remark(|camera| camera.optics.focal_length_mm = f64::NAN).is_some());
+        // A calibration moves the boresight, and does not mirror the detector.
+        let calibrated = |change: fn(&mut Instrument)| {
+            let mut camera = usual_instrument().clone();
+            change(&mut camera);
+            camera_agrees(&camera, true, all_instruments())
+        };
+        assert_eq!(
+            calibrated(|camera| camera.detector.boresight_px += 500.0),
+            None
+        );
+        let mirrored = calibrated(|camera| camera.detector.samples_along = Sense::MinusY);
+        assert!(mirrored.unwrap().text.contains(expected));
+        assert!(calibrated(|camera| camera.optics.focal_length_mm *= 1.1).is_some());
         // A camera that no file describes.
         assert_eq!(remark(|camera| camera.naif.frame = "OWN".to_owned()), None);
     }

@@ -111,14 +111,16 @@ pub(super) fn supported(
             let part = [said.first_detector, said.samples];
             within_detector(&image.id, camera, said.crosstrack_summing, part).in_file(path)?;
         }
-        // A calibration exists because the camera differs.
-        if said.calibration.is_none() {
-            remarks.extend(camera_agrees(&said.instrument, all_instruments()));
-        }
+        let is_calibrated = said.calibration.is_some();
+        remarks.extend(camera_agrees(
+            &said.instrument,
+            is_calibrated,
+            all_instruments(),
+        ));
     }
     let mut notes = vec![file.note()];
     notes.extend(said.calibration.as_ref().map(|name| {
-        format!("its camera is the result of the calibration {name}, and is not compared with the built-in camera")
+        format!("its camera is the result of the calibration {name}: its boresight is not compared with that of the built-in camera")
     }));
     let label = cube.as_ref().and_then(|cube| cube.label.as_ref());
     if let Some(cube) = &cube {
