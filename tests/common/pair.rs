@@ -41,19 +41,19 @@ mosaic = true
 
 /// Writes `pair.toml` and its files: two images, and the terrain model of this pair.
 pub(crate) fn write_pair(folder: &Path) {
-    write(folder, &IMAGES[..2], "images = [\"s1\", \"nd\"]\n");
+    write(folder, 1, &IMAGES[..2], "images = [\"s1\", \"nd\"]\n");
 }
 
 /// Writes `pair.toml` and its files: three images, and the terrain model of all pairs with filled holes.
-pub(crate) fn write_three_images(folder: &Path) {
-    write(folder, &IMAGES, "filled = true\n");
+pub(crate) fn write_three_images(folder: &Path, seed: u64) {
+    write(folder, seed, &IMAGES, "filled = true\n");
 }
 
-fn write(folder: &Path, images: &[(&str, &str, u32)], surface: &str) {
+fn write(folder: &Path, seed: u64, images: &[(&str, &str, u32)], surface: &str) {
     let mut site = format!("{SITE}{surface}");
     for (id, name, lines) in images {
         let scene = LineScene {
-            seed: 1,
+            seed,
             size: [*lines, 240],
             is_wrong: false,
         };

@@ -6,89 +6,37 @@
     reason = "helpers of tests may fail loudly, and write site files"
 )]
 
-use std::{
-    fs::{self, File},
-    path::Path,
-    sync::atomic::AtomicBool,
-};
+use std::{fs::File, path::Path};
 
-use areograph::{
-    scene::{LineScene, write_line_scene},
-    watch::Watch,
-};
+use areograph::scene::LineScene;
 use tiff::decoder::{Decoder, DecodingResult};
 
 use crate::{
     common::{
         json,
         mission::{areograph, succeed},
+        pair::write_three_images,
     },
     matched_ties::Points,
 };
 
-const SITE: &str = r#"site = "three"
-kernels.files = ["leapseconds.tls"]
-[[shots]]
-files = ["shots.csv"]
-layout = "areograph"
-[[windows]]
-id = "three"
-longitude_deg = [296.0, 298.0]
-latitude_deg = [-34.0, -32.0]
-[[images]]
-id = "s1"
-isd = "first/isd/s1.json"
-pixels = "first/images/s1.tif"
-[[images]]
-id = "nd"
-isd = "second/isd/nd.json"
-pixels = "second/images/nd.tif"
-[[images]]
-id = "s2"
-isd = "third/isd/s2.json"
-pixels = "third/images/s2.tif"
-[ties]
-match = true
-[surface]
-cell_m = 200.0
-filled = true
-[registration]
-model = "samples"
-"#;
-
-const LEAP_SECONDS: &str = include_str!("../../kernels.example/leapseconds.tls");
-
-/// Images of the same ground; files of pixels without labels differ by their sizes.
-fn write(folder: &Path) -> LineScene {
-    let scene = |lines: u32| LineScene {
-        seed: 7,
-        size: [lines, 240],
-        is_wrong: false,
-    };
-    for (name, lines) in [("first", 400), ("second", 390), ("third", 380)] {
-        let never = AtomicBool::new(false);
-        write_line_scene(&folder.join(name), &scene(lines), Watch::from(&never)).unwrap();
-    }
-    let mut search = areograph();
-    search.args(["--quiet", "pedr", "search"]);
-    search.arg(folder.join("first/pedr"));
-    search.args(["--box=-64.0,-62.0,-34.0,-32.0", "--out"]);
-    succeed(search.arg(folder.join("shots.csv")));
-    fs::write(folder.join("leapseconds.tls"), LEAP_SECONDS).unwrap();
-    fs::write(folder.join("three.toml"), SITE).unwrap();
-    scene(400)
-}
+const SEED: u64 = 7;
 
 #[test]
 fn heights_of_all_pairs_are_within_what_they_state() {
     let folder = tempfile::tempdir().unwrap();
-    let scene = write(folder.path());
+    write_three_images(folder.path(), SEED);
+    let scene = LineScene {
+        seed: SEED,
+        size: [400, 240],
+        is_wrong: false,
+    };
     let out = folder.path().join("out");
     let mut run = areograph();
     run.args(["--quiet", "run"])
-        .arg(folder.path().join("three.toml"));
+        .arg(folder.path().join("pair.toml"));
     succeed(run.arg("--out").arg(&out));
-    let products = out.join("three");
+    let products = out.join("pair");
     let document = json(&products.join("surface.json"));
     println!("{}", document["joint"]);
     let pairs = document["joint"]["pairs"].as_array().unwrap();

@@ -89,7 +89,7 @@ pub(crate) static SHORT: [Scene; 6] = [
     },
     Scene {
         name: "pair",
-        write: write_three_images,
+        write: |folder| write_three_images(folder, 1),
         run: |folder| run_site_in(folder, "pair.toml"),
         declared: &[
             ("search_footprints", "ReadShots"),
