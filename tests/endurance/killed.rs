@@ -49,14 +49,14 @@ fn run(site: &Path, out: &Path, threads: &str) -> Command {
 }
 
 /// Whether a call changes a file below `out`. Hashes of input files do not count: whether a run keeps them depends on how long
-/// ago the files changed.
+/// ago the files changed. Nor do folders: of two threads that need the same new ones, either makes them, so that their number varies.
 fn changes_file(call: &Call, out: &Path) -> bool {
     let name = call.path.file_name().unwrap_or_default().to_string_lossy();
     let of_hashes = name.starts_with(".hashes") || name.starts_with(".partial-");
     // Each writing of them makes and flushes their folder as well.
     let of_own = call.path.ends_with(".cache/.hashes");
     let is_hashes = call.path == out || of_own || (call.path.parent() == Some(out) && of_hashes);
-    call.changes() && call.path.starts_with(out) && !is_hashes
+    call.changes() && call.name != "mkdir" && call.path.starts_with(out) && !is_hashes
 }
 
 /// Every change of a file below `out` that an undisturbed run makes, in order.
