@@ -1,14 +1,25 @@
 //! `areograph calibrate`.
 
-use std::{path::PathBuf, process::ExitCode};
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+    process::ExitCode,
+};
 
-use clap::Args;
+use clap::{Args, Subcommand};
 
 use super::{
-    load, report,
+    finish, load, output, report,
     single::{self, RunArguments},
 };
-use crate::{config::CalibrationConfig, flow::Task};
+use crate::{
+    config::{CalibrationConfig, CamerasConfig},
+    error::{Cause, IoError, Locate as _, Result},
+    flow::Task,
+    stages::calibrate::apply_calibration,
+    store::{atomic, files::file_name, published::read_published},
+};
 
 /// Calibrates the lines of a camera in orbit, first from tie points, then from laser points, some of which are withheld for
 /// validation.
@@ -17,25 +28,79 @@ use crate::{config::CalibrationConfig, flow::Task};
 /// calibration that was stopped or killed resumes at the first incomplete stage of its round.
 ///
 /// Products go to `<out>/<calibration>`, with calibrated support data (ISD) of every line. Angles that tie points cannot determine
-/// are detected and reported.
+/// are detected and reported. `calibrate apply` puts the calibrated cameras in support data of other images, and `calibration.from`
+/// of a site uses them with label and kernels.
 ///
 /// Example: `areograph scene calibration hrsc --images && areograph calibrate hrsc/calibration.toml --out products`
 #[derive(Debug, Args)]
-#[command(verbatim_doc_comment)]
+#[command(
+    verbatim_doc_comment,
+    args_conflicts_with_subcommands = true,
+    subcommand_negates_reqs = true,
+    arg_required_else_help = true
+)]
 pub(super) struct Arguments {
     /// Calibration file (TOML); config/calibrations/example.toml documents every key.
-    #[arg(value_name = "CALIBRATION.toml")]
-    calibration: PathBuf,
+    #[arg(value_name = "CALIBRATION.toml", required = true)]
+    calibration: Option<PathBuf>,
     /// Output folder; the calibration is written to a subfolder.
     #[arg(long, default_value = "out")]
     out: PathBuf,
     #[command(flatten)]
     run: RunArguments,
+    #[command(subcommand)]
+    command: Option<Command>,
 }
 
-/// Runs the calibration and reports the outcome.
+#[derive(Debug, Subcommand)]
+enum Command {
+    Apply(ApplyArguments),
+}
+
+/// Puts the calibrated cameras in support data of other images of the same lines.
+///
+/// Mounting, optics and look directions of a line are replaced; orbit, attitude and line times of the image are unchanged. The
+/// line is identified by `name_sensor`.
+///
+/// Example: `areograph calibrate apply out/h5270 out/h5280/images/*/isd.json --to calibrated`
+#[derive(Debug, Args)]
+#[allow(clippy::doc_markdown, reason = "examples are printed verbatim")]
+#[command(verbatim_doc_comment)]
+struct ApplyArguments {
+    /// Products of a calibration.
+    #[arg(value_name = "OUT/CALIBRATION")]
+    folder: PathBuf,
+    /// Image support data.
+    #[arg(value_name = "ISD.json", required = true)]
+    isds: Vec<PathBuf>,
+    /// Folder for the files, created if missing. A file keeps its name; `isd.json` is named after its folder.
+    #[arg(long, value_name = "DIR", default_value = "calibrated")]
+    to: PathBuf,
+}
+
+/// Support data that cannot be written.
+#[derive(Debug, thiserror::Error, Cause)]
+#[cause(Configuration)]
+enum ApplyError {
+    #[error("{0} holds no calibrated cameras; expected the products of `areograph calibrate`")]
+    #[cause("name the folder of the calibration")]
+    NoCalibration(String),
+    #[error("two support data would become {0}; expected different names")]
+    #[cause("apply the calibration in two steps, with different folders after --to")]
+    SameName(String),
+    #[error("would replace its own input; expected another folder")]
+    #[cause("name another folder with --to")]
+    OwnInput,
+}
+
+/// Runs the calibration and reports the outcome, or applies one.
 pub(super) fn run(arguments: &Arguments) -> ExitCode {
-    let calibration: CalibrationConfig = match load(&arguments.calibration) {
+    if let Some(Command::Apply(arguments)) = &arguments.command {
+        return finish(apply(arguments));
+    }
+    // Required without a subcommand.
+    let file = arguments.calibration.clone().unwrap_or_default();
+    let calibration: CalibrationConfig = match load(&file) {
         Ok(calibration) => calibration,
         Err(failure) => return report(&failure),
     };
@@ -50,4 +115,54 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
             count("left_out"),
         )
     })
+}
+
+/// Writes the support data only after all of them have been computed.
+fn apply(arguments: &ApplyArguments) -> Result<()> {
+    let folder = &arguments.folder;
+    read_published(folder)?;
+    let cameras = CamerasConfig {
+        from: Some(folder.clone()),
+    }
+    .cameras();
+    if cameras.is_empty() {
+        return Err(ApplyError::NoCalibration(folder.display().to_string()).into());
+    }
+    let mut applied = BTreeMap::new();
+    for isd in &arguments.isds {
+        let path = arguments.to.join(name_of(isd));
+        let is_own = path
+            .canonicalize()
+            .is_ok_and(|path| isd.canonicalize().is_ok_and(|isd| isd == path));
+        if is_own {
+            return Err(ApplyError::OwnInput).in_file(isd);
+        }
+        let result = apply_calibration(&cameras, isd)?;
+        if applied.insert(path.clone(), result).is_some() {
+            return Err(ApplyError::SameName(path.display().to_string()).into());
+        }
+    }
+    fs::create_dir_all(&arguments.to)
+        .map_err(IoError::on("create"))
+        .in_file(&arguments.to)?;
+    for (path, of) in &applied {
+        atomic::write(path, of.isd.as_bytes())?;
+        output::line(format_args!(
+            "{}: camera {} of {}, look directions moved by up to {:.2} px",
+            path.display(),
+            of.camera,
+            of.calibration,
+            of.moved_px
+        ));
+    }
+    Ok(())
+}
+
+/// File name of the support data; products of sites, `isd.json`, are named after their folder, the image.
+fn name_of(isd: &Path) -> String {
+    let name = file_name(isd);
+    match isd.parent().and_then(Path::file_name) {
+        Some(image) if name == "isd.json" => format!("{}.json", image.to_string_lossy()),
+        _ => name,
+    }
 }

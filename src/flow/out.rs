@@ -130,7 +130,8 @@ fn check_apart(out: &Path, site: &SiteConfig) -> std::result::Result<(), OutErro
     };
     let of_site = real_path(&folder_of(&site.file));
     let (real_out, real_products) = (real_path(out), real_path(&products));
-    let folders: BTreeSet<PathBuf> = inputs(site).into_iter().map(folder_of).collect();
+    let mut folders: BTreeSet<PathBuf> = inputs(site).into_iter().map(folder_of).collect();
+    folders.extend(site.calibration.from.clone());
     for folder in &folders {
         let real = real_path(folder);
         apart(real.starts_with(&real_products), &products, folder)?;

@@ -56,7 +56,7 @@ use crate::{
         tag_times::{ImageTimes, TagTimes},
         tag_utc::TagUtc,
     },
-    store::book::Book,
+    store::{book::Book, published::read_published},
 };
 
 /// The names of all steps in order, for `--until`.
@@ -137,6 +137,12 @@ pub(super) fn prepare<D: SiteDriver>(flow: &mut D, config: &SiteConfig) -> Flow<
     let clocks = kernels(flow, config, Some(&RequiredCoverage::default()), 0)?;
     let images = {
         let kernels = &KernelView::text(clocks.as_ref());
+        if let Some(from) = &config.calibration.from {
+            flow.attempt(TagTimes::NAME, |_| read_published(from).map(drop))?;
+        }
+        let calibration = config.calibration.cameras();
+        let kind = SizedFile::SupportData;
+        let calibration = &*flow.hash_sized(TagTimes::NAME, kind, &calibration)?;
         let tag = |image: &ImageConfig| {
             let source = image.source().map_or(&[][..], std::slice::from_ref);
             // A cube has its pixels beside its label.
@@ -154,6 +160,12 @@ pub(super) fn prepare<D: SiteDriver>(flow: &mut D, config: &SiteConfig) -> Flow<
                 body: &config.body,
                 image,
                 label,
+                // Support data and cubes have their own camera.
+                calibration: InOrder(if image.support().is_some() {
+                    &[]
+                } else {
+                    calibration
+                }),
                 support,
                 cube,
                 kernels,

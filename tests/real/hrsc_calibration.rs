@@ -11,8 +11,9 @@
 )]
 
 use crate::common;
+use crate::usgscsm;
 
-use std::{fs, path::Path};
+use std::{fs, path::Path, process::Command};
 
 use areograph::{
     body::Body,
@@ -172,6 +173,26 @@ fn isd(line: &Level2<'_>) -> String {
     format!("out/hrsc/images/{}/isd.json", name(line))
 }
 
+/// Displacement of the samples, which a calibration finds.
+const OFF_PX: [f64; 2] = [3.0, -2.0];
+
+/// Calibrates the two lines from simulated points, with laser points or without.
+fn calibrate(case: &Case, name: &str, control: &str) -> Command {
+    let isd = LINES.each_ref().map(isd);
+    let file = format!("{name}.toml");
+    case.write(
+        &file,
+        format!(
+            "calibration = '{name}'\n[[cameras]]\nid = 's1'\nisd = '{}'\n[[cameras]]\nid = 's2'\nisd = '{}'\n\
+             [ties]\nfiles = ['ties.csv']\n{control}",
+            isd[0], isd[1]
+        ),
+    );
+    let mut calibrate = case.areograph();
+    calibrate.args(["calibrate", &file, "--out", "out"]);
+    calibrate
+}
+
 #[test]
 fn support_data_of_a_run_are_calibrated_and_used_without_an_edit() {
     let Some(folder) = real_data(FOLDER, "HRSC from kernels to a calibration") else {
@@ -182,21 +203,12 @@ fn support_data_of_a_run_are_calibrated_and_used_without_an_edit() {
     for (path, line) in isd.iter().zip(&LINES) {
         assert_eq!(json(&case.path(path))["name_sensor"], line.line[1]);
     }
-    let (lines, off_px) = (lines(&case), [3.0, -2.0]);
+    let (lines, off_px) = (lines(&case), OFF_PX);
     let [ties, control] = tables(&points(&lines, off_px));
     case.write("ties.csv", ties);
     case.write("control.csv", control);
-    case.write(
-        "calibration.toml",
-        format!(
-            "calibration = 'h5270'\n[[cameras]]\nid = 's1'\nisd = '{}'\n[[cameras]]\nid = 's2'\nisd = '{}'\n\
-             [ties]\nfiles = ['ties.csv']\n[control]\nfiles = ['control.csv']\n",
-            isd[0], isd[1]
-        ),
-    );
-    let mut calibrate = case.areograph();
-    calibrate.args(["calibrate", "calibration.toml", "--out", "out"]);
-    succeed(&mut calibrate);
+    let control = "[control]\nfiles = ['control.csv']\n";
+    succeed(&mut calibrate(&case, "h5270", control));
     assert_eq!(
         json(&case.path("out/h5270/manifest.json"))["verdict"]["valid"],
         true
@@ -234,6 +246,167 @@ fn support_data_of_a_run_are_calibrated_and_used_without_an_edit() {
             );
         }
     }
+    applied(&case, &isd);
+    used_by_a_site(&case);
+    refused(&case, &isd);
+}
+
+/// Where support data see points near those that the uncalibrated line sees.
+fn seen_by(path: &Path, uncalibrated: &LineCamera) -> Vec<([f64; 2], Vector3<f64>)> {
+    let camera = LineCamera::read(path, "line", Body::Mars).unwrap();
+    let shares = [0.1, 0.3, 0.5, 0.7, 0.9];
+    let places = shares.iter().flat_map(|of_line| {
+        shares.map(|share| [of_line * f64::from(SIZE[0]), share * f64::from(SIZE[1])])
+    });
+    let seen = places.map(|[line, sample]| {
+        let ray = uncalibrated.camera.ray(line, sample);
+        let place_m = ray.position_m + ray.direction() * 370_000.0;
+        (seen(&camera, &place_m).unwrap(), place_m)
+    });
+    seen.collect()
+}
+
+/// The calibration in the support data that a run wrote: orbit and attitude of these, camera of the calibration. Another program
+/// reads them as areograph does.
+fn applied(case: &Case, isd: &[String; 2]) {
+    let mut apply = case.areograph();
+    apply.args([
+        "calibrate",
+        "apply",
+        "out/h5270",
+        &isd[0],
+        &isd[1],
+        "--to",
+        "applied",
+    ]);
+    let told = case.outcome(apply);
+    assert!(told.starts_with("exit 0"), "{told}");
+    for (index, line) in LINES.iter().enumerate() {
+        let path = case.path(&format!("applied/{}.json", name(line)));
+        let camera = ["s1", "s2"][index];
+        let expected = format!(
+            "{}.json: camera {camera} of h5270, look directions moved by up to ",
+            name(line)
+        );
+        assert!(told.contains(&expected), "{told}");
+        let [before, now, calibrated] = [
+            case.path(&isd[index]),
+            path.clone(),
+            case.path(&format!("out/h5270/cameras/{camera}/isd.json")),
+        ];
+        let documents = [&before, &now, &calibrated].map(|path| json(path));
+        for key in ["instrument_position", "line_scan_rate", "body_rotation"] {
+            assert_eq!(documents[0][key], documents[1][key], "{key}");
+        }
+        for key in [
+            "optical_distortion",
+            "detector_center",
+            "areograph_calibration",
+        ] {
+            assert_eq!(documents[2][key], documents[1][key], "{key}");
+        }
+        let uncalibrated = LineCamera::read(&before, "line", Body::Mars).unwrap();
+        let places = seen_by(&now, &uncalibrated);
+        let ground_m: Vec<_> = places.iter().map(|(_, place_m)| *place_m).collect();
+        let Some(others) = usgscsm::seen(&now, &ground_m, "calibrated support data in usgscsm")
+        else {
+            continue;
+        };
+        for (([line, sample], _), other) in places.iter().zip(others) {
+            // As for uncalibrated support data: interpolation, and the iterations of both programs.
+            let off_px = (line - other[0]).hypot(sample - other[1]);
+            assert!(
+                off_px < usgscsm::LIMIT_PX,
+                "{off_px} px at {line}, {sample}"
+            );
+        }
+    }
+}
+
+/// Labels and kernels with the calibrated cameras see as the support data to which the calibration was applied.
+fn used_by_a_site(case: &Case) {
+    let site = String::from_utf8(case.read("site.toml")).unwrap();
+    let site = site.replace("site = 'hrsc'", "site = 'with'");
+    case.write("with.toml", site + "[calibration]\nfrom = 'out/h5270'\n");
+    let mut run = case.areograph();
+    run.args(["run", "with.toml", "--out", "out"]);
+    succeed(&mut run);
+    for line in &LINES {
+        let own = case.path(&format!("out/with/images/{}/isd.json", name(line)));
+        assert_eq!(json(&own)["areograph_calibration"]["calibration"], "h5270");
+        let applied = case.path(&format!("applied/{}.json", name(line)));
+        let uncalibrated = LineCamera::read(&case.path(&isd(line)), "line", Body::Mars).unwrap();
+        let both = seen_by(&own, &uncalibrated)
+            .into_iter()
+            .zip(seen_by(&applied, &uncalibrated));
+        for ((own, _), (applied, _)) in both {
+            // Both tables of the orientation are interpolated.
+            let off_px = (own[0] - applied[0]).hypot(own[1] - applied[1]);
+            assert!(
+                off_px < usgscsm::LIMIT_PX,
+                "{off_px} px: {own:?} {applied:?}"
+            );
+        }
+    }
+}
+
+/// Calibrations of another line, damaged ones and invalid ones, each by its name.
+fn refused(case: &Case, isd: &[String; 2]) {
+    let applied = |folder: &str, isd: &str| {
+        let mut apply = case.areograph();
+        apply.args(["calibrate", "apply", folder, isd, "--to", "refused"]);
+        let told = case.outcome(apply);
+        assert!(!case.path("refused").exists(), "{told}");
+        told
+    };
+    let told = applied("out/hrsc", &isd[0]);
+    assert!(
+        told.contains("out/hrsc holds no calibrated cameras"),
+        "{told}"
+    );
+    let told = applied("out/absent", &isd[0]);
+    assert!(told.contains("out/absent"), "{told}");
+    // A line that the calibration does not contain.
+    let text = String::from_utf8(case.read(&isd[0])).unwrap();
+    case.write("other.json", text.replace("MEX_HRSC_S1", "MEX_HRSC_IR"));
+    let told = applied("out/h5270", "other.json");
+    let expected = "other.json: the calibration has no camera MEX_HRSC_IR, only MEX_HRSC_S1, MEX_HRSC_S2; expected a calibration of the line";
+    assert!(told.contains(expected), "{told}");
+    // Without laser points the pointing is not determined.
+    let told = case.outcome(calibrate(case, "ties_only", ""));
+    assert!(told.contains("ties_only: INVALID"), "{told}");
+    let told = applied("out/ties_only", &isd[0]);
+    let expected = "the calibration ties_only is invalid; expected a valid calibration";
+    assert!(
+        told.contains("isd.json") && told.contains(expected),
+        "{told}"
+    );
+    // One digit of a calibrated camera.
+    let path = "out/h5270/cameras/s1/isd.json";
+    let text = String::from_utf8(case.read(path)).unwrap();
+    let at = text.find("\"sample\": ").unwrap() + 10;
+    let digit = text[at..]
+        .find(|letter: char| letter.is_ascii_digit())
+        .unwrap()
+        + at;
+    let changed = if &text[digit..=digit] == "9" {
+        "8"
+    } else {
+        "9"
+    };
+    case.write(
+        path,
+        format!("{}{changed}{}", &text[..digit], &text[digit + 1..]),
+    );
+    let told = applied("out/h5270", &isd[0]);
+    assert!(told.contains("cameras/s1/isd.json"), "{told}");
+    let mut run = case.areograph();
+    run.args(["run", "with.toml", "--out", "out"]);
+    let told = case.outcome(run);
+    assert!(
+        told.contains("with/tag_times") && told.contains("cameras/s1/isd.json"),
+        "{told}"
+    );
 }
 
 fn hashed(case: &Case, line: &Level2<'_>) -> HashedFile {

@@ -46,10 +46,10 @@ use serde_json::Value;
 
 const SITES: [&str; 3] = ["eos_chasma", "gusev_crater", "isidis"];
 /// Lines and samples: 0.01 for interpolation, on top of which both programs stop their iterations.
-const LIMIT_PX: f64 = 0.01;
+pub(crate) const LIMIT_PX: f64 = 0.01;
 
 /// Where the camera of `isd` sees points of the ground: line and sample.
-fn seen(isd: &Path, ground_m: &[Vector3<f64>], test: &str) -> Option<Vec<[f64; 2]>> {
+pub(crate) fn seen(isd: &Path, ground_m: &[Vector3<f64>], test: &str) -> Option<Vec<[f64; 2]>> {
     let mut camera = readers::camera(isd, "ground-to-image", test)?;
     camera.stdin(Stdio::piped()).stdout(Stdio::piped());
     let mut camera = camera.spawn().unwrap();

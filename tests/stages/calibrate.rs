@@ -26,7 +26,7 @@ use areograph::{
     stage::Stage,
     stages::calibrate::{
         Calibrate, Calibration, CalibrationFiles, CalibrationKeys, ControlFigures, Figures,
-        PointKind, Scatter,
+        PointKind, Scatter, apply_calibration,
     },
 };
 use common::{assert_keeps_schema, flows::run_into, json, number};
@@ -433,6 +433,36 @@ fn looks(of: &ImageSupport) -> Vec<Vector3<f64>> {
         .to_vec()
 }
 
+/// Angles between look directions, and the volume that three of them span, are those of the polynomials in
+/// `calibration.json`: these do not depend on the axes.
+fn bends_as_stated(looks: &[Vector3<f64>], camera: &Value) {
+    let value = |terms: &Value, s: f64| -> f64 {
+        let terms = terms.as_array().unwrap().iter().rev();
+        terms.fold(0.0, |sum, term| sum * s + number(&term["value"]))
+    };
+    let stated: Vec<Vector3<f64>> = [-1.0, -0.5, 0.0, 0.5, 1.0]
+        .map(|s| Vector3::new(value(&camera["m"], s), value(&camera["n"], s), 1.0).normalize())
+        .to_vec();
+    let shape = |looks: &[Vector3<f64>]| {
+        let pairs = [[0, 1], [1, 2], [2, 3], [3, 4], [0, 4]];
+        let angles = pairs.map(|[a, b]| looks[a].angle(&looks[b]));
+        // Distance of the middle look from the plane of the outer ones.
+        let bend = looks[0].cross(&looks[4]).normalize().dot(&looks[2]).abs();
+        (angles, bend)
+    };
+    let ((angles, bend), (expected, expected_bend)) = (shape(looks), shape(&stated));
+    for (angle, expected) in angles.iter().zip(expected) {
+        assert!(
+            (angle - expected).abs() < 0.01 * PIXEL,
+            "{angle} {expected} rad"
+        );
+    }
+    assert!(
+        (bend - expected_bend).abs() < 0.01 * PIXEL,
+        "{bend} {expected_bend} rad"
+    );
+}
+
 #[test]
 fn calibrated_support_data_look_where_the_calibration_says() {
     let folder = scene(&[]);
@@ -457,8 +487,11 @@ fn calibrated_support_data_look_where_the_calibration_says() {
             (0.85..1.02).contains(&(moved_px / told_px)),
             "{moved_px} {told_px} px"
         );
-        // Bending is known to half a pixel beforehand, and support data hold none.
-        assert!(number(&of["isd_left_px"]) < 1.0, "{of}");
+        // The line is curved, and support data hold the curve.
+        let distortion = &json(&path)["optical_distortion"];
+        assert!(distortion["transverse"].is_object(), "{distortion}");
+        assert!(number(&of["isd_left_px"]) < 0.01, "{of}");
+        bends_as_stated(&looks(&new), of);
         // The laser's places are seen where they are measured, but for their noise of a pixel and 100 m.
         let mut off_px = Vec::new();
         for row in control.lines().skip(1) {
@@ -476,6 +509,71 @@ fn calibrated_support_data_look_where_the_calibration_says() {
             assert!(rms(off_px.iter().map(|of| of[axis])) < 6.0);
         }
     }
+}
+
+/// The calibration in support data of another orbit sees this orbit's control as the report of the calibration states.
+#[test]
+fn a_calibration_applies_to_another_orbit() {
+    let folder = scene(&[]);
+    let outcome = run(folder.path(), false).unwrap();
+    let result = json(&outcome.folder.join("calibration.json"));
+    let calibrated =
+        ["s1", "s2"].map(|camera| outcome.folder.join(format!("cameras/{camera}/isd.json")));
+    let control = fs::read_to_string(folder.path().join("lines/i818_control.csv")).unwrap();
+    for (index, camera) in ["s1", "s2"].into_iter().enumerate() {
+        let isd = folder.path().join(format!("lines/isd/i818_{camera}.json"));
+        let applied = apply_calibration(&calibrated, &isd).unwrap();
+        assert_eq!(
+            [&applied.calibration, &applied.camera],
+            ["synthetic_lines", camera]
+        );
+        let path = folder.path().join("applied.json");
+        fs::write(&path, &applied.isd).unwrap();
+        let [before, after] = [&isd, &path].map(|path| {
+            let support = read_isd(path).unwrap();
+            let rows = control
+                .lines()
+                .skip(1)
+                .map(|row| row.split(',').collect::<Vec<_>>());
+            let of_camera = rows.filter(|cells| cells[1] == camera);
+            rms(of_camera.map(|cells| {
+                let of: Vec<f64> = cells[2..].iter().map(|of| of.parse().unwrap()).collect();
+                let [x, y] = off_of(&support, &of);
+                x.hypot(y)
+            }))
+        });
+        let stated = |when: &str| {
+            number(&result["validation"][0][when]["control"][0]["cameras"][index]["plane_px"])
+        };
+        // Tangents of oblique looks are longer than angles, by up to 1/cos² of 19 degrees.
+        for (seen_px, when) in [(before, "before"), (after, "after")] {
+            let ratio = seen_px / stated(when);
+            assert!(
+                (0.85..1.02).contains(&ratio),
+                "{when}: {seen_px} {} px",
+                stated(when)
+            );
+        }
+        assert!(
+            after < 0.5 * before,
+            "{camera}: {before} px before, {after} px after"
+        );
+    }
+    // Exchanged lines.
+    let exchanged = [&calibrated[0], &calibrated[1]].map(|path| fs::read_to_string(path).unwrap());
+    let (s1, s2) = (
+        "\"name_sensor\": \"STEREO LINE S1\"",
+        "\"name_sensor\": \"STEREO LINE S2\"",
+    );
+    assert!(exchanged[0].contains(s1), "{}", &exchanged[0][..200]);
+    fs::write(&calibrated[0], exchanged[0].replace(s1, s2)).unwrap();
+    fs::write(&calibrated[1], exchanged[1].replace(s2, s1)).unwrap();
+    let isd = folder.path().join("lines/isd/i818_s1.json");
+    let refused = apply_calibration(&calibrated, &isd)
+        .unwrap_err()
+        .to_string();
+    let expected = "° from the uncalibrated camera; expected at most 1°";
+    assert!(refused.contains(expected), "{refused}");
 }
 
 /// What support data miss a place by, pixels in the camera's own focal plane: a row of line, sample, longitude, latitude, radius.

@@ -20,6 +20,8 @@ use crate::{constants::Spacecraft, time::PointingBias};
 
 /// Maximum number of coefficients of a distortion.
 pub const COEFFICIENTS_MAX: usize = 10;
+/// Terms of a polynomial of third degree in two coordinates: 1, x, y, x², xy, y², x³, x²y, xy², y³.
+pub const TRANSVERSE_TERMS: usize = 10;
 
 /// A line-scan camera.
 ///
@@ -40,7 +42,7 @@ pub struct Instrument {
     pub label: LabelNames,
     /// Numbers and frames in kernels.
     pub naif: NaifNames,
-    /// Rotation from the bus to the camera, used if no kernel is available.
+    /// Rotation from the bus to the camera, used if no kernel is available, and for a calibrated camera.
     pub mounting: Mounting,
     /// Focal length and pixel pitch.
     pub optics: Optics,
@@ -52,6 +54,21 @@ pub struct Instrument {
     pub summing: SummingLimits,
     /// Time correction of its attitude.
     pub pointing: PointingTime,
+    /// Calibration whose result its mounting, optics, detector line and distortion are; `None` for a camera of an
+    /// instrument file.
+    #[serde(default)]
+    pub calibration: Option<Calibrated>,
+}
+
+/// The calibration that determined a camera.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Calibrated {
+    /// Its name.
+    pub calibration: String,
+    /// Name of the camera in it.
+    pub camera: String,
+    /// Whether its verdict is valid.
+    pub valid: bool,
 }
 
 impl Instrument {
@@ -195,6 +212,12 @@ pub enum DistortionModel {
     AcrossQuotient {
         /// `k`, 1/mm².
         coefficient_per_mm2: f64,
+    },
+    /// Distorted focal-plane coordinates are polynomials of third degree of the ideal ones, millimetres: the form
+    /// `transverse` of usgscsm.
+    Transverse {
+        /// Coefficients of the coordinate along the track, towards +X, then of that across it, towards +Y.
+        coefficients: [[f64; TRANSVERSE_TERMS]; 2],
     },
     /// The angle off the boresight is `c₁ r + c₃ r³ + …`, `r` the distance of the detector place from the
     /// boresight in thousands of pixels, across the track after multiplication by a scale: the form of the

@@ -204,6 +204,7 @@ fn camera(top: &mut DataTable<'_>, review: &mut Review<'_>) -> Instrument {
             ck_bias_s: ck_bias_s(table, spacecraft, review),
             source,
         }),
+        calibration: None,
     }
 }
 

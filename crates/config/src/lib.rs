@@ -19,6 +19,7 @@
 
 mod adjustment;
 mod calibration;
+mod cameras;
 mod data_file;
 mod declare;
 mod document;
@@ -60,6 +61,7 @@ pub use calibration::{
     APrioriConfig, CalibrationConfig, CalibrationLaserConfig, CalibrationMode, CameraConfig,
     SolutionConfig, ValidationConfig,
 };
+pub use cameras::CamerasConfig;
 pub use declare::{Accept, DeclaredKey, ValueKind, Word};
 pub use document::{Document, Loaded};
 pub use exposures::{ExposurePiece, line_times_of};

@@ -19,6 +19,7 @@ use areograph_base::{
 
 use super::{
     adjustment::AdjustmentConfig,
+    cameras::CamerasConfig,
     declare::{Keys, declare_table, key, no_repeats, of_the_file, table, tables},
     document::{Document, with_file},
     forms::{any_text, lower_case_identifier, words},
@@ -81,6 +82,8 @@ declare_table! {
         windows: Vec<WindowConfig> = tables(WINDOWS),
         /// Images, possibly none.
         images: Vec<ImageConfig> = tables(IMAGES),
+        /// Calibration of the cameras.
+        calibration: CamerasConfig = table(),
         /// Limits of the range check.
         range_check: RangeCheckConfig = table(),
         /// Sampling of exterior orientation.

@@ -37,19 +37,21 @@ use areograph_base::{
     body::Body,
     error::Result,
     frames::{self, Frame, J2000},
-    instruments::{Instrument, NaifNames},
+    instruments::{DistortionModel, Instrument, NaifNames},
     line_times::LinePiece,
     units::METRES_PER_KM,
 };
 use areograph_geom::{attitude::continuous_quaternions, pushbroom::Distortion};
+use areograph_pds::isd::VALID;
 use areograph_stages::{
     sample_orientation::{CameraTables, InterpolationCheck, LightTimeEffect},
     tag_times::ImageTimes,
 };
 use areograph_store::stage::Round;
 use document::{
-    DetectorCentre, FocalLength, InstrumentPointing, Interpolation, Isd, KernelName, Keyword,
-    OpticalDistortion, Positions, Provenance, Radial, Radii, ReferenceHeight, Rotation, schema,
+    CalibratedBy, DetectorCentre, FocalLength, InstrumentPointing, Interpolation, Isd, KernelName,
+    Keyword, OpticalDistortion, Positions, Provenance, Radial, Radii, ReferenceHeight, Rotation,
+    Transverse, schema,
 };
 
 /// J2000 in NAIF's numbering of inertial frames.
@@ -198,17 +200,30 @@ fn isd<'a>(site: &SiteProducts<'a>, view: &View<'a>) -> Isd<'a> {
         },
         focal2pixel_lines: [0.0, pixels_per_mm, 0.0],
         focal2pixel_samples: [0.0, 0.0, detector.samples_along.sign() * pixels_per_mm],
-        optical_distortion: OpticalDistortion {
-            radial: Radial {
-                coefficients: times.detector().radial_fit(instrument).coefficients,
-            },
-        },
+        optical_distortion: distortion(times),
         starting_detector_line: 0,
         starting_detector_sample: times.first_detector,
         instrument_position: positions(&tables.et_s, &tables.position_m, &tables.velocity_m_s),
         sun_position: sun_position(tables),
         kernels: kernels_by_type(site),
         areograph: provenance(site, view),
+        areograph_calibration: instrument.calibration.as_ref().map(|of| CalibratedBy {
+            calibration: &of.calibration,
+            camera: &of.camera,
+            verdict: if of.valid { VALID } else { "invalid" },
+        }),
+    }
+}
+
+/// The distortion of a calibrated camera as it is; that of others as usgscsm's radial coefficients.
+fn distortion(times: &ImageTimes) -> OpticalDistortion {
+    match times.instrument.distortion {
+        DistortionModel::Transverse {
+            coefficients: [x, y],
+        } => OpticalDistortion::Transverse(Transverse { x, y }),
+        _ => OpticalDistortion::Radial(Radial {
+            coefficients: times.detector().radial_fit(&times.instrument).coefficients,
+        }),
     }
 }
 
@@ -372,6 +387,8 @@ fn provenance<'a>(site: &SiteProducts<'a>, view: &View<'a>) -> Provenance<'a> {
         let source = times.support.as_ref();
         let source = source.map_or("the instrument kernel states", |_| "the support data state");
         format!("optical_distortion: none, as {source}")
+    } else if let DistortionModel::Transverse { .. } = times.instrument.distortion {
+        "optical_distortion: that of the calibrated camera".to_owned()
     } else {
         let fit = detector.radial_fit(&times.instrument);
         format!(

@@ -102,6 +102,7 @@ const fn distortion(model: &DistortionModel) -> &'static str {
         DistortionModel::None => "none",
         DistortionModel::RadialPolynomial { .. } => "radial",
         DistortionModel::AcrossQuotient { .. } => "across the track (lrolrocnac)",
+        DistortionModel::Transverse { .. } => "transverse",
         DistortionModel::AnglePolynomial { .. } => "angle off the boresight",
     }
 }

@@ -31,7 +31,7 @@ use areograph_base::{
     time::{CkLookup, Et},
     units::METRES_PER_KM,
 };
-use areograph_geom::body_rotation::frame_rotation_3;
+use areograph_geom::{attitude::bus_to_camera, body_rotation::frame_rotation_3};
 
 /// Digits of a second in UTC strings for people.
 const UTC_DECIMALS: u8 = 3;
@@ -373,7 +373,8 @@ impl Session {
         Ok(ticks.map_err(|error| self.explain(error, &clocks(self.spacecraft)))?)
     }
 
-    /// Mounting of `instrument` by the loaded kernels, converted to its camera axes.
+    /// Mounting of `instrument` by the loaded kernels, converted to its camera axes; that of its calibration, if it is
+    /// calibrated.
     ///
     /// # Errors
     /// [`SpiceError::MissingText`] when no loaded kernel defines the two frames.
@@ -382,6 +383,9 @@ impl Session {
         instrument: &Instrument,
         et: Et,
     ) -> Result<Rotation<SpacecraftBus, CameraFrame>> {
+        if instrument.calibration.is_some() {
+            return Ok(Rotation::new(bus_to_camera(&instrument.mounting), et));
+        }
         let frames = [&instrument.naif.bus_frame, &instrument.naif.frame]
             // A name with a zero byte is truncated there, and then no kernel defines it.
             .map(|name| CString::new(name.split('\0').next().unwrap_or_default()))

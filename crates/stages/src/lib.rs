@@ -42,9 +42,9 @@ pub mod tag_times;
 pub mod tag_utc;
 pub mod triangulate;
 
+use shared::{calibrated_camera, ground, image_view, raster, shot_heights, turn};
 pub use shared::{
     camera_lines, image_pixels, line_camera, look, mola_surface, orientation, oriented, site_image,
 };
-use shared::{ground, image_view, raster, shot_heights, turn};
 #[cfg(test)]
 use shared::{invented_orthoimage, invented_pair};

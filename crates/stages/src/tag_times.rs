@@ -22,11 +22,12 @@ use pieces::{Pieces, rows_of};
 pub use support::SupportFile;
 use support::supported;
 
+use crate::calibrated_camera::calibrated_camera;
 use areograph_base::{
     body::Body,
     error::{Locate, Result},
     image::ImageFields,
-    instruments::Instrument,
+    instruments::{Calibrated, Instrument},
     line_times::LineTimes,
     time::{Et, Interval},
 };
@@ -36,7 +37,11 @@ use areograph_config::{
 use areograph_geom::pushbroom::Detector;
 use areograph_pds::{ImageLabel, read_label};
 use areograph_spice::{KernelView, Session};
-use areograph_store::{files::HashedFile, stage::Stage, stage_inputs};
+use areograph_store::{
+    files::HashedFile,
+    stage::{InOrder, Stage},
+    stage_inputs,
+};
 
 /// Times and settings of the exposure of an image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -197,6 +202,8 @@ stage_inputs! {
         pub support: Option<HashedFile>,
         /// The oriented cube that it names instead.
         pub cube: Option<HashedFile>,
+        /// The calibrated support data of `calibration.from`, for an image that kernels orient.
+        pub calibration: InOrder<'a, HashedFile>,
         /// Text kernels.
         pub kernels: &'a KernelView,
     }
@@ -204,7 +211,7 @@ stage_inputs! {
 
 impl Stage for TagTimes<'_> {
     const NAME: &'static str = "tag_times";
-    const METHOD: u32 = 13;
+    const METHOD: u32 = 14;
     const CHECKED: bool = true;
     type Output = ImageTimes;
     stage_inputs!(fingerprint);
@@ -218,6 +225,7 @@ impl Stage for TagTimes<'_> {
             *self.body,
             self.image,
             self.support.as_ref().or(self.cube.as_ref()),
+            self.calibration.0,
             self.kernels.session()?,
         )
     }
@@ -237,7 +245,7 @@ impl Stage for TagTimes<'_> {
 pub fn tag_times(images: &[ImageConfig], session: &Session) -> Result<Vec<ImageTimes>> {
     images
         .iter()
-        .map(|image| tag_image(Body::Mars, image, None, session))
+        .map(|image| tag_image(Body::Mars, image, None, &[], session))
         .collect()
 }
 
@@ -245,11 +253,12 @@ fn tag_image(
     body: Body,
     image: &ImageConfig,
     hashed: Option<&HashedFile>,
+    calibration: &[HashedFile],
     session: &Session,
 ) -> Result<ImageTimes> {
     let times = match image.support() {
         Some(path) => supported(body, image, path, hashed, session),
-        None => image_times(image, session),
+        None => image_times(image, calibration, session),
     };
     match image.source() {
         Some(path) => times.in_file(path),
@@ -257,9 +266,19 @@ fn tag_image(
     }
 }
 
-fn image_times(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
+fn image_times(
+    image: &ImageConfig,
+    calibration: &[HashedFile],
+    session: &Session,
+) -> Result<ImageTimes> {
     let (mut notes, mut remarks) = (Vec::new(), Vec::new());
-    let (instrument, label) = labelled(image)?;
+    let (mut instrument, label) = labelled(image)?;
+    let files = calibration.iter().map(|file| &*file.path);
+    let sensor = instrument.sensor_name().to_owned();
+    if let Some(found) = calibrated_camera(&instrument, &sensor, files)? {
+        notes.extend(found.camera.calibration.as_ref().map(calibrated_note));
+        instrument = found.camera;
+    }
     let session = &session.of(instrument.spacecraft);
     let utc_stop = label.as_ref().and_then(|label| label.utc_stop.clone());
     let tells_lines = label.is_some() && !instrument.spacecraft.labels_tell_clock;
@@ -296,7 +315,7 @@ fn image_times(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
         };
         remarks.push(part.on_first_pixel(&image.id, tells_lines)?.into());
     }
-    remarks.extend(camera_agrees(&instrument, false, all_instruments()));
+    remarks.extend(camera_agrees(&instrument, all_instruments()));
     of_one_clock(image, instrument.spacecraft, fields.sclk_start.as_deref())?;
     let stated_start = start_time(image, &fields, session, &mut notes, &mut remarks)?;
     let pieces = Pieces {
@@ -343,6 +362,14 @@ fn image_times(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
         remarks,
         support: None,
     })
+}
+
+/// A note on an image with a calibrated camera.
+fn calibrated_note(of: &Calibrated) -> String {
+    format!(
+        "its camera is the result of the calibration {}: its boresight is not compared with that of the built-in camera",
+        of.calibration
+    )
 }
 
 /// Lines in the delivered file, with a note when they are fewer than in the header.

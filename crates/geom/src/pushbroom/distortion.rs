@@ -3,7 +3,11 @@
 //! Look directions are tangents in camera axes, `q1/q3` along the track and `q2/q3` across it. A distorted
 //! line is a curve in this plane: every sample has its own tangent along the track.
 
-use areograph_base::instruments::{COEFFICIENTS_MAX, DistortionModel, Instrument};
+use nalgebra::{Matrix2, Vector2};
+
+use areograph_base::instruments::{
+    COEFFICIENTS_MAX, DistortionModel, Instrument, TRANSVERSE_TERMS,
+};
 
 /// Distances from the boresight below this are zero, thousands of pixels or millimetres.
 const DISTANCE_MIN: f64 = 1e-6;
@@ -44,6 +48,11 @@ enum Law {
     /// Across the track ideal coordinates are the distorted ones over `1 + k c²`, millimetres, in front of a focal
     /// length.
     AcrossQuotient { focal_length_mm: f64 },
+    /// Distorted coordinates are polynomials of the ideal ones, millimetres, in front of a focal length.
+    Transverse {
+        focal_length_mm: f64,
+        polynomials: [[f64; TRANSVERSE_TERMS]; 2],
+    },
 }
 
 /// A point of the line and its change with the coordinate `c` across the track.
@@ -101,6 +110,14 @@ impl Distortion {
                 std::slice::from_ref(coefficient_per_mm2),
                 [pitch_mm, pitch_mm * detector.along_track_px],
             ),
+            DistortionModel::Transverse { coefficients } => (
+                Law::Transverse {
+                    focal_length_mm: instrument.optics.focal_length_mm,
+                    polynomials: *coefficients,
+                },
+                &[],
+                [pitch_mm, pitch_mm * detector.along_track_px],
+            ),
             DistortionModel::AnglePolynomial {
                 coefficients_rad,
                 scale,
@@ -151,7 +168,8 @@ impl Distortion {
         for step in 0..=CHECKED_AT {
             let pixel = f64::from(step) / f64::from(CHECKED_AT) * f64::from(detector.pixels);
             let place = line.within((pixel - detector.boresight_px) * line.per_sample);
-            let ahead = place.across * place.c >= 0.0; // else the tangent of more than a right angle
+            // Else the tangent of more than a right angle; polynomials give tangents, and may move the boresight.
+            let ahead = matches!(line.law, Law::Transverse { .. }) || place.across * place.c >= 0.0;
             if !(ahead && place.across_by_c > 0.0 && place.across_by_c.is_finite()) {
                 return Err(FoldedLine { pixel });
             }
@@ -191,7 +209,7 @@ impl Distortion {
 }
 
 impl DistortedLine {
-    /// Tangent over distance at the distance `r`, and its derivative over `r`.
+    /// Tangent over distance at the distance `r`, and its derivative over `r`; 1/f for polynomials of both coordinates.
     fn scale(&self, r: f64) -> [f64; 2] {
         let square = r * r;
         // Value and derivative by r² of the polynomial in r².
@@ -213,6 +231,9 @@ impl DistortedLine {
                     -2.0 * coefficient / (by * by * focal_length_mm),
                 ]
             }
+            Law::Transverse {
+                focal_length_mm, ..
+            } => [1.0 / focal_length_mm, 0.0],
             Law::Angle if r < DISTANCE_MIN => [value, 2.0 * (rate + value * value * value / 3.0)],
             Law::Angle => {
                 let tangent = (r * value).tan();
@@ -236,6 +257,13 @@ impl DistortedLine {
                 across_by_c: scale + c * c * rate,
             };
         }
+        if let Law::Transverse {
+            focal_length_mm,
+            polynomials,
+        } = &self.law
+        {
+            return self.transverse(*focal_length_mm, polynomials, c);
+        }
         let [scale, rate] = self.scale(c.hypot(self.along));
         CurvePoint {
             c,
@@ -243,6 +271,39 @@ impl DistortedLine {
             across: c * scale,
             along_by_c: self.along * c * rate,
             across_by_c: scale + c * c * rate,
+        }
+    }
+
+    /// The point whose distorted coordinates are those of the line at `c`, by Newton's method.
+    fn transverse(
+        &self,
+        focal_length_mm: f64,
+        polynomials: &[[f64; TRANSVERSE_TERMS]; 2],
+        c: f64,
+    ) -> CurvePoint {
+        let mut ideal = Vector2::new(self.along, c);
+        let mut by_ideal = Matrix2::identity();
+        for _ in 0..STEPS_MAX {
+            let distorted;
+            (distorted, by_ideal) = third_degree(polynomials, &ideal);
+            let missed = Vector2::new(self.along, c) - distorted;
+            let Some(step) = by_ideal.try_inverse().map(|inverse| inverse * missed) else {
+                break;
+            };
+            ideal += step;
+            // Written so that NaN ends it.
+            if !(step.amax() > LAST_STEP * focal_length_mm) {
+                break;
+            }
+        }
+        // A singular one has no coordinate that increases with c: the check refuses it.
+        let by_distorted = by_ideal.try_inverse().unwrap_or_default();
+        CurvePoint {
+            c,
+            along: ideal.x / focal_length_mm,
+            across: ideal.y / focal_length_mm,
+            along_by_c: by_distorted.m12 / focal_length_mm,
+            across_by_c: by_distorted.m22 / focal_length_mm,
         }
     }
 
@@ -288,4 +349,58 @@ impl DistortedLine {
         }
         c
     }
+}
+
+/// Polynomials of third degree at a place, and their derivatives: a row for each polynomial.
+///
+/// # Source
+/// `computeTransverseDistortion` of usgscsm: the order of the terms.
+fn third_degree(
+    polynomials: &[[f64; TRANSVERSE_TERMS]; 2],
+    place: &Vector2<f64>,
+) -> (Vector2<f64>, Matrix2<f64>) {
+    let (x, y) = (place.x, place.y);
+    let terms = [
+        1.0,
+        x,
+        y,
+        x * x,
+        x * y,
+        y * y,
+        x * x * x,
+        x * x * y,
+        x * y * y,
+        y * y * y,
+    ];
+    let by_x = [
+        0.0,
+        1.0,
+        0.0,
+        2.0 * x,
+        y,
+        0.0,
+        3.0 * x * x,
+        2.0 * x * y,
+        y * y,
+        0.0,
+    ];
+    let by_y = [
+        0.0,
+        0.0,
+        1.0,
+        0.0,
+        x,
+        2.0 * y,
+        0.0,
+        x * x,
+        2.0 * x * y,
+        3.0 * y * y,
+    ];
+    let sum = |of: &[f64; TRANSVERSE_TERMS], row: usize| -> f64 {
+        of.iter().zip(&polynomials[row]).map(|(a, b)| a * b).sum()
+    };
+    (
+        Vector2::new(sum(&terms, 0), sum(&terms, 1)),
+        Matrix2::new(sum(&by_x, 0), sum(&by_y, 0), sum(&by_x, 1), sum(&by_y, 1)),
+    )
 }

@@ -7,12 +7,15 @@
 
 use nalgebra::{Matrix2, Matrix3, Vector2};
 
-use super::document::{IsdError, Object};
+use super::{
+    CALIBRATED_BY, VALID,
+    document::{IsdError, Object},
+};
 use areograph_base::{
     constants::{SPACECRAFT, Spacecraft},
     instruments::{
-        DetectorLine, DistortionModel, Instrument, LabelNames, Mounting, NaifNames, Optics,
-        PointingTime, Sense, SummingLimits,
+        Calibrated, DetectorLine, DistortionModel, Instrument, LabelNames, Mounting, NaifNames,
+        Optics, PointingTime, Sense, SummingLimits,
     },
 };
 use areograph_geom::{
@@ -146,6 +149,7 @@ pub(super) fn camera(
             ck_bias_s: 0.0,
             source: "support data: attitudes refer to their epochs".to_owned(),
         },
+        calibration: calibration(document)?,
     };
     match Distortion::check(&instrument) {
         Ok(()) => Ok((instrument, turn)),
@@ -236,7 +240,7 @@ fn identifier(name: &str) -> String {
 /// The distortion model, by its name in usgscsm.
 fn distortion(document: &Object<'_>, turned_rad: f64) -> Result<DistortionModel, IsdError> {
     const KEY: &str = "optical_distortion";
-    const KNOWN: &str = "one of the supported distortions radial and lrolrocnac";
+    const KNOWN: &str = "one of the supported distortions radial, transverse and lrolrocnac";
     let table = document.object(KEY)?;
     let [name] = table.keys()[..] else {
         return Err(document.refused(KEY, KNOWN));
@@ -251,10 +255,16 @@ fn distortion(document: &Object<'_>, turned_rad: f64) -> Result<DistortionModel,
                 DistortionModel::RadialPolynomial { coefficients }
             })
         }
-        "lrolrocnac" if turned_rad.sin().abs() > ALONG_AXIS => Err(document.refused(
-            "focal2pixel_samples",
-            "samples along y, to which the distortion lrolrocnac applies",
-        )),
+        "lrolrocnac" | "transverse" if turned_rad.sin().abs() > ALONG_AXIS => {
+            let expected = format!("samples along y, to which the distortion {name} applies");
+            Err(document.refused("focal2pixel_samples", expected))
+        }
+        "transverse" => {
+            let polynomials = table.object(name)?;
+            Ok(DistortionModel::Transverse {
+                coefficients: [polynomials.numbers("x")?, polynomials.numbers("y")?],
+            })
+        }
         "lrolrocnac" => {
             let [coefficient_per_mm2] = table.object(name)?.numbers("coefficients")?;
             Ok(DistortionModel::AcrossQuotient {
@@ -263,4 +273,18 @@ fn distortion(document: &Object<'_>, turned_rad: f64) -> Result<DistortionModel,
         }
         _ => Err(document.refused(KEY, KNOWN)),
     }
+}
+
+/// The calibration whose result the support data are.
+fn calibration(document: &Object<'_>) -> Result<Option<Calibrated>, IsdError> {
+    if !document.has(CALIBRATED_BY) {
+        return Ok(None);
+    }
+    let origin = document.object(CALIBRATED_BY)?;
+    Ok(Some(Calibrated {
+        calibration: origin.text("calibration")?.to_owned(),
+        camera: origin.text("camera")?.to_owned(),
+        // Earlier versions did not state the verdict.
+        valid: !origin.has("verdict") || origin.text("verdict")? == VALID,
+    }))
 }

@@ -194,6 +194,11 @@ impl<'a> Object<'a> {
         self.find(key, "a whole number")?.code()
     }
 
+    /// A value of any kind.
+    pub(super) fn any(&self, key: &str) -> Result<&'a Value, IsdError> {
+        Ok(self.find(key, "a value")?.value)
+    }
+
     pub(super) fn numbers<const N: usize>(&self, key: &str) -> Result<[f64; N], IsdError> {
         self.find(key, format!("{N} finite numbers"))?.row()
     }

@@ -28,7 +28,7 @@ use self::{
     tables::span,
 };
 pub use self::{
-    rewrite::StraightCamera,
+    rewrite::{LineCurve, LineOptics},
     tables::{Rotations, States},
     target::ForeignBody,
 };
@@ -53,8 +53,10 @@ const BYTES_MAX: u64 = 1 << 26;
 const LINES_MAX: u32 = 10_000_000;
 const SAMPLES_MAX: u32 = 1_000_000;
 const SUMMING_MAX: u32 = 1_000;
-/// Key of the calibration that support data are the result of, and of its camera.
+/// Key of the calibration that support data are the result of, of its camera and of its verdict.
 pub const CALIBRATED_BY: &str = "areograph_calibration";
+/// The verdict of a calibration whose cameras can be used.
+pub const VALID: &str = "valid";
 /// Line scanners, the only supported cameras.
 pub(crate) const LINE_SCANNER: &str = "USGS_ASTRO_LINE_SCANNER_SENSOR_MODEL";
 /// Ephemeris times, seconds: five centuries around J2000.
@@ -85,8 +87,6 @@ pub struct ImageSupport {
     pub platform: String,
     /// Identifier of the image, where it is stated.
     pub identifier: Option<String>,
-    /// Name of the calibration whose result they are.
-    pub calibration: Option<String>,
     /// Positions and rotations.
     pub tables: SupportTables,
 }
@@ -205,7 +205,6 @@ fn support_of(document: &Object<'_>) -> Result<ImageSupport> {
         platform: document.text("name_platform")?.to_owned(),
         // An identifier of a different kind, as a number, names no product.
         identifier: document.text("image_identifier").ok().map(str::to_owned),
-        calibration: calibration(document)?,
         tables,
     })
 }
@@ -223,15 +222,6 @@ fn radii_m(document: &Object<'_>) -> std::result::Result<[f64; 2], IsdError> {
     let equatorial = radii.number("semimajor", limits)?;
     let polar = radii.number("semiminor", [limits[0], equatorial])?;
     Ok([equatorial * metres, polar * metres])
-}
-
-/// The calibration whose result the support data are.
-fn calibration(document: &Object<'_>) -> std::result::Result<Option<String>, IsdError> {
-    if !document.has(CALIBRATED_BY) {
-        return Ok(None);
-    }
-    let origin = document.object(CALIBRATED_BY)?;
-    Ok(Some(origin.text("calibration")?.to_owned()))
 }
 
 /// NAIF code of the target, which ALE writes beside the camera.

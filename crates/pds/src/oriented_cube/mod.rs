@@ -159,7 +159,6 @@ fn read(label: &Label, file: &File, cameras: &[Instrument]) -> Result<OrientedCu
         target: Some(i64::from(body.naif().body)),
         platform: of_image.instrument.spacecraft.label_name.clone(),
         identifier: of_image.product_id.clone(),
-        calibration: None,
         tables,
     };
     Ok(OrientedCube {

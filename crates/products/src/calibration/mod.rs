@@ -15,7 +15,7 @@ use super::{
 };
 use areograph_base::error::{Locate as _, Result};
 use areograph_config::CalibrationConfig;
-use areograph_pds::isd::CALIBRATED_BY;
+use areograph_pds::isd::{CALIBRATED_BY, VALID};
 use areograph_stages::calibrate::{Calibration, CameraResult};
 
 /// Placeholder of a camera in paths.
@@ -56,16 +56,23 @@ static CAMERA_SUPPORT: Declaration<WriteCamera> = Declaration {
     rows: "",
     role: Role::Data,
     content: Content::Foreign,
-    write: |path, of, camera| {
-        let named = named_by(&camera.isd, &of.config.calibration, &camera.camera);
-        write_text(path, &named).map(|()| 0)
-    },
+    write: |path, of, camera| write_text(path, &named_by(of, camera)).map(|()| 0),
     uses: &[],
 };
 
-/// Support data that state by which calibration, and as which camera, they were calibrated.
-fn named_by(isd: &str, calibration: &str, camera: &str) -> String {
-    let origin = serde_json::json!({"calibration": calibration, "camera": camera});
+/// Support data that state by which calibration, with which verdict, and as which camera, they were calibrated.
+fn named_by(of: &CalibrationProducts, camera: &CameraResult) -> String {
+    let verdict = if of.result.verdict.valid {
+        VALID
+    } else {
+        "invalid"
+    };
+    let origin = serde_json::json!({
+        "calibration": of.config.calibration,
+        "camera": camera.camera,
+        "verdict": verdict,
+    });
+    let isd = &camera.isd;
     isd.replacen('{', &format!("{{\n  \"{CALIBRATED_BY}\": {origin},"), 1)
 }
 

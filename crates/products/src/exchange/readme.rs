@@ -48,6 +48,7 @@ fn text(of: &Context) -> String {
     if !site.images.is_empty() {
         text += &light_time(site);
     }
+    text += &calibrated(site);
     if site.footprints.is_empty() {
         text += "The site has no footprints, so there are no tables of footprints here.\n\n";
     } else if site.config.products.formats.is_empty() {
@@ -102,6 +103,24 @@ fn light_time(site: &SiteProducts) -> String {
         text += ADJUSTED;
     }
     text
+}
+
+/// Images whose camera programs with SPICE kernels do not know; empty without them.
+fn calibrated(site: &SiteProducts) -> String {
+    let images = site
+        .images
+        .iter()
+        .filter(|image| image.times.instrument.calibration.is_some());
+    let names: Vec<&str> = images.map(|image| &*image.times.id).collect();
+    if names.is_empty() {
+        return String::new();
+    }
+    format!(
+        "The cameras of {} are calibrated. Camera models (ISD) contain the calibrated camera. Kernels contain the attitude of the\n\
+         spacecraft only: programs that take the mounting and the optics of the camera from SPICE kernels, such as ISIS,\n\
+         do not see these images as calibrated.\n\n",
+        names.join(", ")
+    )
 }
 
 /// Conventions after an adjustment.

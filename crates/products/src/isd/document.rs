@@ -6,7 +6,10 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::kernel_report::KernelsByType;
-use areograph_base::schema::{DocumentSchema, at};
+use areograph_base::{
+    instruments::TRANSVERSE_TERMS,
+    schema::{DocumentSchema, at},
+};
 use areograph_stages::{
     sample_orientation::{InterpolationCheck, LightTimeEffect},
     tag_times::StartFrom,
@@ -67,6 +70,18 @@ pub(super) struct Isd<'a> {
     /// Kernel names by type, in load order, and qualities.
     pub(super) kernels: KernelsByType<'a>,
     pub(super) areograph: Provenance<'a>,
+    /// Calibration whose result the camera is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) areograph_calibration: Option<CalibratedBy<'a>>,
+}
+
+/// The calibration of a camera.
+#[derive(Serialize, JsonSchema)]
+pub(super) struct CalibratedBy<'a> {
+    pub(super) calibration: &'a str,
+    pub(super) camera: &'a str,
+    /// `valid` or `invalid`.
+    pub(super) verdict: &'static str,
 }
 
 /// Range of heights in which camera models search for the ground.
@@ -101,8 +116,18 @@ pub(super) struct DetectorCentre {
 }
 
 #[derive(Serialize, JsonSchema)]
-pub(super) struct OpticalDistortion {
-    pub(super) radial: Radial,
+#[serde(rename_all = "lowercase")]
+pub(super) enum OpticalDistortion {
+    Radial(Radial),
+    /// Of a calibrated camera whose line is curved.
+    Transverse(Transverse),
+}
+
+/// Coefficients of 1, x, y, x², xy, y², x³, x²y, xy² and y³, with the ideal x and y in millimetres.
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Transverse {
+    pub(super) x: [f64; TRANSVERSE_TERMS],
+    pub(super) y: [f64; TRANSVERSE_TERMS],
 }
 
 /// Coefficients of r, r³ and r⁵, with r in millimetres.

@@ -325,7 +325,7 @@ fn remarks(of: &Evidence<'_>) -> Vec<String> {
             camera.isd_left_px > ISD_LEFT_PX,
             format!(
                 "the calibrated support data of camera {} deviate by up to {:.2} px from its look directions, which \
-                 are curved: support data represent only a straight line of equal samples",
+                 their distortion of third degree does not represent",
                 camera.camera, camera.isd_left_px
             ),
         );

@@ -2,8 +2,9 @@
 //!
 //! This stage knows support data, names and withheld points. The axes across, along and down are the spacecraft axes
 //! nearest to these directions in the first image. Calibrated support data are the given ones with a straight line of
-//! equal samples (`pds/isd/rewrite`), and the remaining difference is stated.
+//! equal samples and a distortion of third degree (`pds/isd/rewrite`), and the remaining difference is stated.
 
+mod apply;
 mod demands;
 mod elsewhere;
 mod error;
@@ -32,6 +33,7 @@ use areograph_store::{
     stage_inputs,
 };
 
+pub use apply::{AppliedCalibration, apply_calibration};
 pub use demands::CONTROLS_MIN;
 pub use error::CalibrateError;
 pub use lines::{AlignLines, CalibrateLines, LineKeys, OtherOrbits};
@@ -82,7 +84,7 @@ impl Input for CalibrationFiles<'_> {
 
 impl Stage for Calibrate<'_> {
     const NAME: &'static str = "calibrate";
-    const METHOD: u32 = 15;
+    const METHOD: u32 = 16;
     type Output = Calibration;
     stage_inputs!(fingerprint);
 

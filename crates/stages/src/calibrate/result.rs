@@ -89,7 +89,7 @@ pub struct CameraResult {
     /// The calibrated support data.
     pub isd: String,
     /// Their largest residual against the calibrated look directions, pixels: support data hold a straight line of
-    /// equal samples.
+    /// equal samples with a distortion of third degree.
     pub isd_left_px: f64,
 }
 

@@ -1,5 +1,6 @@
 //! Modules that serve several stages: images with their orientation and pixels, and the ground that they show.
 
+pub(crate) mod calibrated_camera;
 pub mod camera_lines;
 pub(crate) mod ground;
 pub mod image_pixels;

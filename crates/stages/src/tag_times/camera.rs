@@ -23,16 +23,12 @@ pub(super) fn known_one<'a>(
 
 /// A remark on a camera with the frame of a known one, but another geometry: kernels cannot show a mirrored detector.
 /// A calibrated camera may have another boresight.
-pub(super) fn camera_agrees(
-    camera: &Instrument,
-    is_calibrated: bool,
-    known: &[Instrument],
-) -> Option<Disagreement> {
+pub(super) fn camera_agrees(camera: &Instrument, known: &[Instrument]) -> Option<Disagreement> {
     let other = known_one(camera, known)?;
     let pixel_rad = |of: &Instrument| of.optics.pixel_pitch_mm / of.optics.focal_length_mm;
     let scale = pixel_rad(camera) / pixel_rad(other);
     let apart_px = |of: fn(&Instrument) -> f64| {
-        if is_calibrated {
+        if camera.calibration.is_some() {
             return 0.0;
         }
         (of(camera) - of(other)).abs()
@@ -80,7 +76,7 @@ pub(super) fn camera_agrees(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use areograph_base::instruments::Sense;
+    use areograph_base::instruments::{Calibrated, Sense};
     use areograph_config::{all_instruments, usual_instrument};
 
     #[test]
@@ -101,7 +97,7 @@ mod tests {
     fn a_mirrored_detector_is_reported_and_rounding_is_not() {
         for camera in all_instruments() {
             assert_eq!(
-                camera_agrees(camera, false, all_instruments()),
+                camera_agrees(camera, all_instruments()),
                 None,
                 "{}",
                 camera.id
@@ -110,7 +106,7 @@ mod tests {
         let remark = |change: fn(&mut Instrument)| {
             let mut camera = usual_instrument().clone();
             change(&mut camera);
-            camera_agrees(&camera, false, all_instruments())
+            camera_agrees(&camera, all_instruments())
         };
         let mirrored = remark(|camera| camera.detector.samples_along = Sense::MinusY).unwrap();
         let expected = "differs in detector.samples_along from";
@@ -127,7 +123,12 @@ mod tests {
         let calibrated = |change: fn(&mut Instrument)| {
             let mut camera = usual_instrument().clone();
             change(&mut camera);
-            camera_agrees(&camera, true, all_instruments())
+            camera.calibration = Some(Calibrated {
+                calibration: "orbit".to_owned(),
+                camera: "line".to_owned(),
+                valid: true,
+            });
+            camera_agrees(&camera, all_instruments())
         };
         assert_eq!(
             calibrated(|camera| camera.detector.boresight_px += 500.0),

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     Disagreement, ImageTimes, StartFrom,
     agreement::{mounting_agrees, of_one_clock, of_one_product, start_agrees, stop_agrees},
+    calibrated_note,
     camera::{camera_agrees, known_one},
     detector::within_detector,
 };
@@ -111,17 +112,18 @@ pub(super) fn supported(
             let part = [said.first_detector, said.samples];
             within_detector(&image.id, camera, said.crosstrack_summing, part).in_file(path)?;
         }
-        let is_calibrated = said.calibration.is_some();
-        remarks.extend(camera_agrees(
-            &said.instrument,
-            is_calibrated,
-            all_instruments(),
-        ));
+        remarks.extend(camera_agrees(&said.instrument, all_instruments()));
     }
     let mut notes = vec![file.note()];
-    notes.extend(said.calibration.as_ref().map(|name| {
-        format!("its camera is the result of the calibration {name}: its boresight is not compared with that of the built-in camera")
-    }));
+    if let Some(of) = &said.instrument.calibration {
+        notes.push(calibrated_note(of));
+        remarks.extend((!of.valid).then(|| {
+            let name = &of.calibration;
+            Disagreement::from(format!(
+                "its camera is the result of the invalid calibration {name}"
+            ))
+        }));
+    }
     let label = cube.as_ref().and_then(|cube| cube.label.as_ref());
     if let Some(cube) = &cube {
         notes.extend(cube.notes());

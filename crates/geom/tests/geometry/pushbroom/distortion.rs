@@ -155,6 +155,47 @@ fn the_whole_detector_comes_back_through_the_ground() {
             comes_back(&camera, 4, &model, lines);
         }
         comes_back(&mapping, 2, &model, lines);
+        comes_back(&transverse(), 2, &model, lines);
+    }
+}
+
+/// A camera whose distorted coordinates, millimetres, are `x − 0.01 − 1e-4 y² + 1e-6 y³ + 1e-3 x y` and
+/// `y + 0.02 + 1e-3 y + 2e-5 y² − 3e-6 y³ + 1e-3 x²` of the ideal ones.
+fn transverse() -> Instrument {
+    let mut camera = camera("moc_na");
+    let mut coefficients = [[0.0; 10]; 2];
+    let [x, y] = &mut coefficients;
+    (x[0], x[1], x[4], x[5], x[9]) = (-0.01, 1.0, 1e-3, -1e-4, 1e-6);
+    (y[0], y[2], y[3], y[5], y[9]) = (0.02, 1.001, 1e-3, 2e-5, -3e-6);
+    camera.distortion = DistortionModel::Transverse { coefficients };
+    camera.detector.along_track_px = 12.0;
+    camera
+}
+
+#[test]
+fn samples_look_where_the_polynomials_put_them() {
+    let instrument = transverse();
+    let detector = detector(&instrument, 1);
+    let (focal_mm, pitch_mm) = (
+        instrument.optics.focal_length_mm,
+        instrument.optics.pixel_pitch_mm,
+    );
+    for sample in [0.0, 300.0, 1_024.0, 2_048.0] {
+        let look = detector.look(sample);
+        let [x, y] = [look.x * focal_mm, look.y * focal_mm];
+        let along_mm = x - 0.01 - 1e-4 * y * y + 1e-6 * y.powi(3) + 1e-3 * x * y;
+        let across_mm = 1.001 * y + 0.02 + 2e-5 * y * y - 3e-6 * y.powi(3) + 1e-3 * x * x;
+        let sense = instrument.detector.samples_along.sign();
+        let expected_mm = sense * (sample - instrument.detector.boresight_px) * pitch_mm;
+        // Pixels: rounding.
+        assert!(
+            (along_mm / pitch_mm - 12.0).abs() < 1e-8,
+            "{along_mm} mm at {sample}"
+        );
+        assert!(
+            (across_mm - expected_mm).abs() / pitch_mm < 1e-8,
+            "{across_mm} mm at {sample}"
+        );
     }
 }
 
