@@ -2,13 +2,13 @@
 //! the rounds of `flow/calibration_rounds.rs`.
 
 use super::{
-    calibration_rounds::rounds,
+    calibration_rounds::{Concluded, rounds},
     driver::{Driver, Flow},
     result::{ManifestEntry, ResultPublication, Written},
 };
 use crate::{
     config::CalibrationConfig,
-    products::{CalibrationProducts, write_calibration_products},
+    products::{CalibrationModel, CalibrationProducts, write_calibration_products},
     report::calibration_page,
     stage::Stage as _,
     stages::calibrate::{
@@ -18,19 +18,21 @@ use crate::{
 };
 
 /// Raised when the layout of the products of a calibration changes.
-const METHOD: u32 = 12;
+const METHOD: u32 = 13;
 
 /// Calibrates the lines of a camera and publishes the products.
 pub(super) fn calibration<D: Driver>(flow: &mut D, config: &CalibrationConfig) -> Flow<()> {
-    let (result, has_further_stages) = if config.ties.matched {
-        rounds(flow, config)?
+    let (result, model, has_further_stages) = if config.ties.matched {
+        let Concluded { calibration, model } = rounds(flow, config)?;
+        let is_pending = model.is_none();
+        (calibration, model, is_pending)
     } else {
         let files = flow.hash(Calibrate::NAME, &calibration_files(config))?;
         let result = flow.stage(&Calibrate {
             calibration: CalibrationKeys(config),
             files: CalibrationFiles(&files),
         })?;
-        (result, false)
+        (result, None, false)
     };
     flow.publish(&ResultPublication {
         written: Written {
@@ -43,10 +45,19 @@ pub(super) fn calibration<D: Driver>(flow: &mut D, config: &CalibrationConfig) -
         result: &result,
         has_further_stages,
         write: |staging: &_, result: &_| {
-            let page = calibration_page(config, result)?;
+            let model = match &model {
+                Some((surface, [first, last])) => Some(CalibrationModel {
+                    surface: &surface.value()?.model,
+                    first: &first.value()?.found,
+                    last: &last.value()?.found,
+                }),
+                None => None,
+            };
+            let page = calibration_page(config, result, model.as_ref())?;
             let products = CalibrationProducts {
                 config,
                 result,
+                model,
                 page: &page,
             };
             write_calibration_products(staging, &products)

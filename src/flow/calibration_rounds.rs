@@ -38,11 +38,17 @@ use crate::{
     },
 };
 
-/// The result of the last round, and whether further rounds may follow that are not known before outputs are.
-pub(super) fn rounds<D: Driver>(
-    flow: &mut D,
-    config: &CalibrationConfig,
-) -> Flow<(Output<Calibration>, bool)> {
+/// The end of the rounds.
+pub(super) struct Concluded {
+    /// The calibration of the last round.
+    pub(super) calibration: Output<Calibration>,
+    /// Its terrain model, and the matches of the laser with the models of the first and of the last round; `None` where
+    /// further rounds may follow that are not known before outputs are.
+    pub(super) model: Option<(Output<Surface>, [Output<ModelMatch>; 2])>,
+}
+
+/// The result of the last round.
+pub(super) fn rounds<D: Driver>(flow: &mut D, config: &CalibrationConfig) -> Flow<Concluded> {
     let lines = Lines::surveyed(flow, config)?;
     let mut rounds = Rounds {
         rounds: Vec::new(),
@@ -54,17 +60,24 @@ pub(super) fn rounds<D: Driver>(
     for number in 1.. {
         let round = lines.round(flow, number, &before, first.as_ref())?;
         if round.is_pending() {
-            return Ok((round.calibrated, true));
+            before = round.calibrated;
+            break;
         }
         rounds.rounds.push(round.figures(number)?);
-        if rounds.is_converged() || number >= rounds.rounds_max {
-            return Ok((round.concluded(rounds)?, false));
+        let is_last = rounds.is_converged() || number >= rounds.rounds_max;
+        let first = first.get_or_insert_with(|| round.control.clone());
+        if is_last {
+            return Ok(Concluded {
+                calibration: round.concluded(rounds)?,
+                model: Some((round.surface, [first.clone(), round.control])),
+            });
         }
-        first.get_or_insert(round.control);
         before = round.calibrated;
     }
-    // The number of rounds is limited.
-    Ok((before, true))
+    Ok(Concluded {
+        calibration: before,
+        model: None,
+    })
 }
 
 /// The lines of the camera and their files.
@@ -222,7 +235,7 @@ impl Round {
     }
 
     /// The calibration of the last round, with all rounds and the verdict on them.
-    fn concluded(self, rounds: Rounds) -> Result<Output<Calibration>> {
+    fn concluded(&self, rounds: Rounds) -> Result<Output<Calibration>> {
         let (control, ties) = (self.control.value()?, self.ties.value()?);
         let last = self.calibrated.value()?.clone();
         let concluded = last.in_rounds(rounds, &control.found.verdict, &ties.pairs);

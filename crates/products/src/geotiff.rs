@@ -6,14 +6,19 @@
 mod fields;
 mod number;
 
-use std::io::Write as _;
+use std::{io::Write as _, path::Path};
 
 use flate2::{Compression, write::ZlibEncoder};
 use rayon::prelude::*;
 
 use self::fields::{Field, long, table};
+use super::{
+    error::ProductError,
+    files::{read_bytes, write_bytes},
+};
 use areograph_base::{
     body::{Body, MapSphere},
+    error::{Locate as _, Result},
     units::RADIANS_PER_DEGREE,
 };
 use areograph_geom::height_grid::HeightGrid;
@@ -175,6 +180,21 @@ impl<N: Number + Send + Sync> GeoTiff<'_, N> {
             Field::text(42_112, &self.metadata()),
         ]
     }
+}
+
+/// Writes a file and reads it back; returns the number of its cells with a number.
+///
+/// # Errors
+/// Errors of the disk; a file that reads back differently.
+pub fn write_raster<N: Number + Send + Sync>(path: &Path, file: &GeoTiff<'_, N>) -> Result<u64> {
+    let bytes = file.encoded();
+    write_bytes(path, &bytes)?;
+    if read_bytes(path)? != bytes {
+        let what = format!("{} bytes of {}", bytes.len(), file.what);
+        return Err(ProductError::ReadBack { what }).in_file(path);
+    }
+    let known = file.numbers.iter().filter(|number| !number.is_none());
+    Ok(known.count() as u64)
 }
 
 impl<N> GeoTiff<'_, N> {

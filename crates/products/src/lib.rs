@@ -74,7 +74,7 @@ pub use adjustment::ADJUSTMENT;
 pub use archive::{
     ArchiveProducts, WorstProfile, profile_name, write_archive_products, write_profile_shots,
 };
-pub use calibration::{CalibrationProducts, write_calibration_products};
+pub use calibration::{CalibrationModel, CalibrationProducts, write_calibration_products};
 pub use exchange::{
     ContourLayer, ControlMeasure, ControlNetwork, ControlPoint, GroundEstimate, ImageMeasure,
     LidarPoint, NetworkMeasure, NetworkPoint, ProfileShift, on_ground_m, tie_residuals,
@@ -83,7 +83,7 @@ pub use exchange::{
 pub use files::{read_bytes, write_bytes, write_json};
 pub use found_shots::{ShotBatches, ShotsFile};
 pub use generated::{documentation, schemas};
-pub use geotiff::{GeoTiff, Number};
+pub use geotiff::{GeoTiff, Number, write_raster};
 pub use laser_match::{MatchProducts, write_match_products};
 pub use listed::listed;
 pub use net::{NetProducts, write_net_products};

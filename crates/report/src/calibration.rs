@@ -11,6 +11,7 @@ use super::{
 };
 use areograph_base::error::Result;
 use areograph_config::{CalibrationConfig, CalibrationMode};
+use areograph_products::CalibrationModel;
 use areograph_stages::calibrate::{
     Calibration, ControlFigures, Figures, HeldBack, PointKind, Scattered, Value,
 };
@@ -22,10 +23,14 @@ const DRAWN: usize = 3_000;
 ///
 /// # Errors
 /// A plot that cannot be drawn, which is a bug in areograph.
-pub fn calibration_page(config: &CalibrationConfig, of: &Calibration) -> Result<String> {
+pub fn calibration_page(
+    config: &CalibrationConfig,
+    of: &Calibration,
+    model: Option<&CalibrationModel<'_>>,
+) -> Result<String> {
     let rounds = of.rounds.as_ref();
     let rounds = rounds.map(|result| -> Result<Section> {
-        let section = rounds_of(result, &of.cameras)?;
+        let section = rounds_of(result, &of.cameras, model)?;
         Ok(Section::new("From round to round", section))
     });
     let rounds: Option<Section> = rounds.transpose()?;

@@ -6,13 +6,19 @@ use super::{
     plots::{Panel, Plot, Series, figure, label},
 };
 use areograph_base::error::Result;
+use areograph_geom::statistics::median;
+use areograph_products::CalibrationModel;
 use areograph_stages::calibrate::{CalibrationRound, CameraResult, Rounds, Scatter, Scattered};
 
 /// The rounds of these lines.
 ///
 /// # Errors
 /// A plot that cannot be drawn, which is a bug in areograph.
-pub(super) fn rounds(of: &Rounds, cameras: &[CameraResult]) -> Result<Markup> {
+pub(super) fn rounds(
+    of: &Rounds,
+    cameras: &[CameraResult],
+    model: Option<&CalibrationModel<'_>>,
+) -> Result<Markup> {
     let words = format!(
         "A round measures tie points, makes the lines consistent with them, and matches a terrain model with cells of {} m to \
          the laser. Tie points and laser points then calibrate the cameras from which the next round starts. Rounds end when \
@@ -21,7 +27,56 @@ pub(super) fn rounds(of: &Rounds, cameras: &[CameraResult]) -> Result<Markup> {
         label(of.cell_m, 0),
         of.rounds_max
     );
-    Ok(html! { p { (words) } (numbers(of)) (angles(of, cameras)) (plot(of)?) })
+    Ok(
+        html! { p { (words) } (numbers(of)) (angles(of, cameras)) (plot(of)?) (model.map(concordances).unwrap_or_default()) },
+    )
+}
+
+/// Number of units in the table of concordances.
+const UNITS_SHOWN: usize = 12;
+
+/// Concordance of terrain models and laser before and after the calibration, unit by unit.
+fn concordances(of: &CalibrationModel<'_>) -> Markup {
+    let kept = of.last.units.iter().filter(|unit| unit.is_kept());
+    let both: Vec<[f64; 3]> = kept
+        .filter_map(|unit| {
+            let first = of
+                .first
+                .units
+                .iter()
+                .find(|first| first.unit == unit.unit)?;
+            let [before, after] = [first.concordance[0]?, unit.concordance[0]?];
+            Some([unit.unit as f64, before, after])
+        })
+        .collect();
+    if both.is_empty() {
+        return Markup::default();
+    }
+    let median_of = |at: usize| median(&mut both.iter().map(|row| row[at]).collect::<Vec<f64>>());
+    let mut table = Table::new(
+        "Concordance of terrain model and laser heights at withheld shots, without any shift",
+        &[
+            Column::Number("unit"),
+            Column::Number("first round"),
+            Column::Number("last round"),
+        ],
+    );
+    let mut row = |name: String, [before, after]: [f64; 2]| {
+        let numbers = [before, after].map(|of| text(Some(of), 3));
+        let [before, after] = numbers;
+        table.row(true, [name.into(), before, after]);
+    };
+    for [unit, before, after] in both.iter().take(UNITS_SHOWN) {
+        row(label(*unit, 0), [*before, *after]);
+    }
+    row(
+        "median of all kept units".to_owned(),
+        [median_of(1), median_of(2)],
+    );
+    let words = "Every fourth shot of a unit takes no part in the search for its shift. The concordance (Li et al. 2023, eq. 18 and \
+                 Table 4) is 1 only for equal heights. The model of the first round contains the errors of orbit and mounting; \
+                 that of the last round is made with the cameras of the preceding round. `units.parquet` contains all units.";
+    html! { p { (words) } (table.finish()) }
 }
 
 fn text(value: Option<f64>, decimals: usize) -> Cell {

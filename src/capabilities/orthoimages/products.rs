@@ -6,11 +6,12 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::{
-    capabilities::terrain::{Band, write_map, write_raster},
+    capabilities::terrain::{Band, write_map},
     error::Result,
     geom::height_grid::HeightGrid,
     products::{
         Content, Context, Declaration, GeoTiff, Number, Role, SiteProducts, Write, write_json,
+        write_raster,
     },
     schema::DocumentSchema,
     stage::Round,

@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use super::products::{
-    ABOVE_AREOID, Band, above, has_model, reference_file, significant, write_map, write_raster,
+    ABOVE_AREOID, Band, above, has_model, reference_file, significant, write_map,
 };
 use crate::{
     error::Result,
-    products::{Content, Context, Declaration, GeoTiff, Role, SiteProducts, Write},
+    products::{Content, Context, Declaration, GeoTiff, Role, SiteProducts, Write, write_raster},
     report::parts::{Cell, Column, Table, label, signed, whole},
     stages::{
         map_surface::{Joint, Surface, SurfaceModel},

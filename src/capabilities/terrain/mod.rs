@@ -12,7 +12,7 @@ mod section;
 use super::Capability;
 use crate::{error::Result, stage::Round, stages::map_surface::Surface, store::book::Book};
 
-pub(super) use products::{Band, significant_surface, write_map, write_raster};
+pub(super) use products::{Band, significant_surface, write_map};
 
 pub(super) static CAPABILITY: Capability = Capability {
     products: &[

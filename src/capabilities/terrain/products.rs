@@ -8,8 +8,8 @@ use crate::{
     geom::height_grid::HeightGrid,
     pds::terrain_model::{HeightsAbove, read_terrain_model},
     products::{
-        Content, Context, Declaration, GeoTiff, Number, Role, SiteProducts, Write,
-        error::ProductError, read_bytes, write_bytes, write_json,
+        Content, Context, Declaration, GeoTiff, Role, SiteProducts, Write, error::ProductError,
+        write_bytes, write_json, write_raster,
     },
     schema::DocumentSchema,
     stages::map_surface::{Surface, SurfaceModel},
@@ -199,21 +199,6 @@ pub(super) fn above(path: &Path, of: &Context, surface: &str, model: &SurfaceMod
         numbers: &numbers,
     };
     write_raster(path, &file)
-}
-
-/// Writes a file and reads it back; returns the number of its cells with a number.
-pub(in crate::capabilities) fn write_raster<N: Number + Send + Sync>(
-    path: &Path,
-    file: &GeoTiff<'_, N>,
-) -> Result<u64> {
-    let bytes = file.encoded();
-    write_bytes(path, &bytes)?;
-    if read_bytes(path)? != bytes {
-        let what = format!("{} bytes of {}", bytes.len(), file.what);
-        return Err(ProductError::ReadBack { what }).in_file(path);
-    }
-    let known = file.numbers.iter().filter(|number| !number.is_none());
-    Ok(known.count() as u64)
 }
 
 /// Writes the values of all cells, and reads them back like any terrain model.

@@ -2,7 +2,7 @@
 
 use super::{
     contour_interval::contour_interval_m,
-    products::{Band, WITH_A_MODEL, has_model, reference_file, significant_surface, write_raster},
+    products::{Band, WITH_A_MODEL, has_model, reference_file, significant_surface},
 };
 use crate::{
     error::Result,
@@ -13,7 +13,7 @@ use crate::{
     },
     products::{
         Content, Context, ContourLayer, Declaration, GeoTiff, Number, ReadingProgram, Role,
-        SiteProducts, Use, Write, write_contours,
+        SiteProducts, Use, Write, write_contours, write_raster,
     },
     stages::map_surface::Surface,
     units::RADIANS_PER_DEGREE,

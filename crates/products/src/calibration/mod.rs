@@ -2,6 +2,7 @@
 
 mod document;
 mod images;
+mod model;
 mod points;
 
 use std::path::Path;
@@ -18,6 +19,8 @@ use areograph_config::CalibrationConfig;
 use areograph_pds::isd::{CALIBRATED_BY, VALID};
 use areograph_stages::calibrate::{Calibration, CameraResult};
 
+pub use model::CalibrationModel;
+
 /// Placeholder of a camera in paths.
 const CAMERA: &str = "<camera>";
 
@@ -28,6 +31,8 @@ pub struct CalibrationProducts<'a> {
     pub config: &'a CalibrationConfig,
     /// The calibration.
     pub result: &'a Calibration,
+    /// Terrain model and laser units; `None` for a calibration from tables.
+    pub model: Option<CalibrationModel<'a>>,
     /// The report.
     pub page: &'a str,
 }
@@ -88,7 +93,12 @@ pub(super) fn group() -> Group {
         source: "`areograph calibrate`, in the folder of the calibration",
         prefix: "calibration",
         placeholders: "; `<camera>` stands for a line of the camera",
-        products: [described(&[&CAMERA_SUPPORT]), described(PRODUCTS)].concat(),
+        products: [
+            described(&[&CAMERA_SUPPORT]),
+            described(&model::PRODUCTS),
+            described(PRODUCTS),
+        ]
+        .concat(),
     }
 }
 
@@ -111,9 +121,11 @@ pub fn write_calibration_products(
             rows,
         });
     }
-    products.extend(write_each(directory, PRODUCTS, |write, path| {
-        write(path, of)
-    })?);
+    let write = |write: &WriteCalibration, path: &Path| write(path, of);
+    if of.model.is_some() {
+        products.extend(write_each(directory, &model::PRODUCTS, write)?);
+    }
+    products.extend(write_each(directory, PRODUCTS, write)?);
     Ok(products)
 }
 

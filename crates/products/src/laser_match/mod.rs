@@ -3,7 +3,7 @@
 
 mod control;
 mod points;
-mod units;
+pub(super) mod units;
 
 use std::path::Path;
 

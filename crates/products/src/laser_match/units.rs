@@ -1,24 +1,27 @@
 //! Units of laser shots: results of their search, and why they are kept or not.
 
-use super::{MatchProducts, WriteMatch, natural, write_parquet};
+use super::{WriteMatch, natural, write_parquet};
 use crate::{
     coordinates::{degrees, signed_longitude_deg},
     product::{Content, Declaration, Role},
-    table::{Column, Table, Unit, column, meanings},
+    table::{Column, Meaning, Table, Unit, column, meanings},
     text_table,
 };
 use areograph_base::units::wrap_two_pi;
-use areograph_stages::match_laser::UnitResult;
+use areograph_stages::match_laser::{LaserMatch, UnitResult};
+
+/// Content of the table.
+pub(crate) const WHAT: &str = "units of laser shots: shift, validation by withheld shots, and the reason for rejection of units that are \
+                               not kept";
 
 pub(super) static TABLE: Declaration<WriteMatch> = Declaration {
     path: "units.parquet",
-    what: "units of laser shots: shift, validation by withheld shots, and the reason for rejection of units that are \
-           not kept",
+    what: WHAT,
     readers: "scripts",
     rows: "units",
     role: Role::Data,
-    content: Content::Table(|| meanings(&columns())),
-    write: |path, of| write_parquet(path, of, &table(of)),
+    content: Content::Table(meaning),
+    write: |path, of| write_parquet(path, of, &table(of.result)),
     uses: &[],
 };
 
@@ -28,13 +31,18 @@ pub(super) static CSV: Declaration<WriteMatch> = Declaration {
     readers: "spreadsheets, scripts",
     rows: "units",
     role: Role::Data,
-    content: Content::Table(|| meanings(&columns())),
-    write: |path, of| text_table::write(path, table(of)),
+    content: Content::Table(meaning),
+    write: |path, of| text_table::write(path, table(of.result)),
     uses: &[],
 };
 
-fn table<'a>(of: &MatchProducts<'a>) -> Table<'a> {
-    Table::new(columns(), of.result.units.iter().collect())
+pub(crate) fn meaning() -> Vec<Meaning> {
+    meanings(&columns())
+}
+
+/// The units of a match.
+pub(crate) fn table(of: &LaserMatch) -> Table<'_> {
+    Table::new(columns(), of.units.iter().collect())
 }
 
 type Row<'a> = &'a UnitResult;
@@ -159,7 +167,7 @@ fn deviations<'a>() -> [Column<Row<'a>>; 3] {
     ]
 }
 
-fn judged<'a>() -> [Column<Row<'a>>; 7] {
+fn judged<'a>() -> [Column<Row<'a>>; 9] {
     [
         column(
             "score",
@@ -198,6 +206,18 @@ fn judged<'a>() -> [Column<Row<'a>>; 7] {
             "root mean square of model minus laser heights at the withheld shots with the shift, about the bias of \
              the used shots, metres",
             |row: &Row| row.held_out.map(|held_out| held_out.after_m),
+        ),
+        column(
+            "ccc_before",
+            Unit::None,
+            "concordance (Li et al. 2023, eq. 18) of model and laser heights at the withheld shots without the shift",
+            |row: &Row| row.concordance[0],
+        ),
+        column(
+            "ccc_after",
+            Unit::None,
+            "concordance of model and laser heights at the withheld shots with the shift",
+            |row: &Row| row.concordance[1],
         ),
         column(
             "refused_because",

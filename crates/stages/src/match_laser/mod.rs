@@ -86,7 +86,7 @@ stage_inputs! {
 
 impl Stage for MatchLaser<'_> {
     const NAME: &'static str = "match_laser";
-    const METHOD: u32 = 9;
+    const METHOD: u32 = 10;
     const CALLS: &'static [Called] = &[called::<ConvertDatum<'_>>()];
     type Output = LaserMatch;
     stage_inputs!(fingerprint);

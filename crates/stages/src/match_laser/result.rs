@@ -166,6 +166,9 @@ pub struct UnitResult {
     pub found: Option<UnitMatch>,
     /// Held-out shots, where the model has heights with and without the shift.
     pub held_out: Option<HeldOut>,
+    /// Concordance of model and laser heights at held-out shots, without and with the shift (Li et al. 2023, eq. 18 and
+    /// Table 4); `None` where the model has too few heights.
+    pub concordance: [Option<f64>; 2],
     /// Similarity over the shifts of that search; absent in matches of models that are made round by round.
     pub similarity: Option<SimilaritySurface>,
     /// Reason why it is rejected; empty if it is kept.

@@ -63,6 +63,7 @@ impl<'a> Unit<'a> {
             relief_m: (squares.sum::<f64>() / shots.len() as f64).sqrt(),
             found: None,
             held_out: None,
+            concordance: [None; 2],
             similarity: None,
             refused_because: String::new(),
         };
@@ -133,6 +134,10 @@ impl<'a> Unit<'a> {
         let bias_m = at_best.bias();
         result.found = Some(found(grid, &best, bias_m, settled.ok()));
         result.held_out = self.held_out(grid, best.shift, bias_m);
+        result.concordance = [[0.0; 2], best.shift].map(|shift| {
+            let heights = moments(grid, &self.held_out, shift)?;
+            heights.similarity(Similarity::Ccc)
+        });
         let [model_m, laser_m] = at_best.variances().map(f64::sqrt);
         let wrong = [
             (
