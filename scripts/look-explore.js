@@ -105,6 +105,17 @@ async function explore(browser, file, view, picture) {
   }
   expect(controls.every((id) => reached.has(id)), `not reached by keyboard: ${controls.filter((id) => !reached.has(id))}`);
 
+  // What is drawn on the map can be switched.
+  for (const id of ['footprints', 'outlines', 'windows']) {
+    const toggle = page.locator(`#${id}`);
+    if (!await toggle.count()) continue;
+    const on = await drawn(page, '#map canvas');
+    await toggle.uncheck();
+    const off = await drawn(page, '#map canvas');
+    await toggle.check();
+    expect(on !== off && on === await drawn(page, '#map canvas'), `the switch ${id} has no effect on the map`);
+  }
+
   // Profile: keys choose a footprint, and map, image and values follow.
   let checked = 0;
   const check = (of) => {

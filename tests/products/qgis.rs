@@ -17,7 +17,7 @@ use serde_json::Value;
 const RADIUS_M: f64 = 3_396_190.0;
 
 /// The document of a project.
-fn document(project: &Path) -> String {
+pub(crate) fn document(project: &Path) -> String {
     let mut archive = zip::ZipArchive::new(File::open(project).unwrap()).unwrap();
     assert_eq!(archive.len(), 1);
     let mut text = String::new();

@@ -7,6 +7,7 @@
 )]
 
 use crate::common::{
+    mission::site_run,
     page::{lead, section},
     products_site as fixture,
 };
@@ -188,6 +189,52 @@ fn a_gap_in_attitude_is_seen_and_measured() {
     // One red bar for the gap; the swatch of its key is not part of the picture.
     let svg = picture.split("</svg>").next().unwrap();
     assert_eq!(svg.matches("fill=\"#C10019\"").count(), 1);
+}
+
+/// Words that a page shows as it opens, without tables, figures drawn as SVG, and text that is folded.
+fn words_as_opened(page: &str) -> usize {
+    let mut text = String::new();
+    // Elements whose text is not shown, and how many of them are open at a place.
+    let (mut hidden, mut folded, mut summary) = (0_i32, Vec::new(), false);
+    let body = page.split("<body").nth(1).unwrap();
+    for part in body.split('<').skip(1) {
+        let (tag, after) = part.split_once('>').unwrap();
+        let name = tag
+            .split([' ', '/'])
+            .find(|of| !of.is_empty())
+            .unwrap_or("");
+        let is_end = tag.starts_with('/');
+        match name {
+            "table" | "svg" | "style" => hidden += if is_end { -1 } else { 1 },
+            "details" if is_end => {
+                folded.pop();
+            }
+            "details" => folded.push(!tag.split(' ').any(|of| of == "open")),
+            "summary" => summary = !is_end,
+            _ => {}
+        }
+        let own = folded.len() - usize::from(summary && !folded.is_empty());
+        if hidden == 0 && !folded[..own].iter().any(|is_folded| *is_folded) {
+            text += after;
+        }
+        text.push(' ');
+    }
+    assert!(hidden == 0 && folded.is_empty(), "{hidden} {folded:?}");
+    text.split_whitespace().count()
+}
+
+/// A report as it opens is short; `scripts/look` measures its height.
+#[test]
+fn a_report_opens_with_at_most_1200_words() {
+    let few = "<body><p>one two</p><details><summary>three</summary>four</details><details open><summary>five</summary>six \
+               <table><td>seven</td></table></details><svg>eight</svg>";
+    assert_eq!(words_as_opened(few), 5);
+    for site in ["eos_chasma", "gusev_context", "gusev_crater", "isidis"] {
+        let page = fs::read_to_string(site_run(site).join("report/index.html")).unwrap();
+        let words = words_as_opened(&page);
+        println!("{site}: {words} words");
+        assert!((100..=1200).contains(&words), "{site}: {words}");
+    }
 }
 
 #[test]

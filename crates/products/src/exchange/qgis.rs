@@ -15,7 +15,7 @@ use std::{
 };
 
 use areograph_base::error::{Locate as _, Result};
-use areograph_stages::{map_surface::Surface, rectify_images::Orthoimage};
+use areograph_stages::{map_surface::Surface, mosaic_images::Mosaic, rectify_images::Orthoimage};
 use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter, write::SimpleFileOptions};
 
 pub use self::vectors::{on_ground_m, tie_residuals};
@@ -194,6 +194,10 @@ fn layers(of: &Context) -> Result<Vec<Layer>> {
             form: Form::Contours { label: "height_m" },
         });
     }
+    let mosaics = mosaics(of)?;
+    // Orthoimages are below the mosaic that is made of them.
+    let is_alone = mosaics.is_empty();
+    layers.extend(mosaics);
     for orthoimage in Orthoimage::best(site.book)? {
         let id = &site.images[orthoimage.account.image].times.id;
         let path = format!("images/{id}/orthoimage.tif");
@@ -204,7 +208,7 @@ fn layers(of: &Context) -> Result<Vec<Layer>> {
             name: format!("Orthoimage {id}"),
             source: source(&path),
             wkt: equirectangular_wkt(site.config.body, orthoimage.account.parallel_rad),
-            is_shown: true,
+            is_shown: is_alone,
             form: Form::Brightness {
                 range: stretch(&orthoimage.brightness),
             },
@@ -235,6 +239,54 @@ fn layers(of: &Context) -> Result<Vec<Layer>> {
             wkt,
             is_shown: true,
             form: Form::Shaded,
+        });
+    }
+    Ok(layers)
+}
+
+/// The images of the mosaic, the mosaic, and the one before the adjustment.
+fn mosaics(of: &Context) -> Result<Vec<Layer>> {
+    let site = of.site;
+    let mut layers = Vec::new();
+    let mosaics = [
+        (site.book.find_best::<Option<Mosaic>>()?, ""),
+        (site.book.find_before::<Option<Mosaic>>()?, "_before"),
+    ];
+    for (mosaic, suffix) in mosaics {
+        let [brightness, sources] = ["", "_source"].map(|of| format!("mosaic{suffix}{of}.tif"));
+        let is_best = suffix.is_empty();
+        let mosaic = mosaic.and_then(Option::as_ref);
+        let Some(mosaic) = mosaic.filter(|_| is_written(of, &brightness)) else {
+            continue;
+        };
+        let wkt = equirectangular_wkt(site.config.body, mosaic.account.parallel_rad);
+        if is_best && is_written(of, &sources) {
+            let parts = mosaic.account.images.iter();
+            layers.push(Layer {
+                name: "Images of the mosaic".to_owned(),
+                source: source(&sources),
+                wkt: wkt.clone(),
+                is_shown: false,
+                form: Form::Sources {
+                    images: parts
+                        .map(|part| site.images[part.image].times.id.clone())
+                        .collect(),
+                },
+            });
+        }
+        let name = if is_best {
+            "Mosaic"
+        } else {
+            "Mosaic before the adjustment"
+        };
+        layers.push(Layer {
+            name: name.to_owned(),
+            source: source(&brightness),
+            wkt,
+            is_shown: is_best,
+            form: Form::Brightness {
+                range: stretch(&mosaic.brightness),
+            },
         });
     }
     Ok(layers)
