@@ -286,7 +286,9 @@ fn the_page_is_complete_without_a_network_and_the_same_every_time() {
     let hash = STANDARD.encode(Sha256::digest(script.as_bytes()));
     assert!(page.contains(&format!("default-src 'none'; script-src 'sha256-{hash}';")));
     // The picture of the globe is in the page.
-    let parts = page.replace(script, "").replace("src=\"data:image/png;base64,", "");
+    let parts = page
+        .replace(script, "")
+        .replace("src=\"data:image/png;base64,", "");
     for resource in ["src=", "<link", "@import", "http:", "<iframe"] {
         assert!(!parts.contains(resource), "{resource}");
     }

@@ -8,7 +8,7 @@
 
 use crate::common::{
     mission::site_run,
-    page::{lead, section},
+    page::{csv, lead, section},
     products_site as fixture,
 };
 
@@ -16,6 +16,8 @@ use std::{collections::BTreeSet, fs, path::Path};
 
 use areograph::{capabilities, geom::statistics::Summary, stages::judge::CheckKind};
 use areograph_testing::replace;
+
+use crate::qgis;
 use fixture::{SHOTS, Site};
 
 /// The page, also left below `target`, where a person may look at it.
@@ -221,6 +223,47 @@ fn words_as_opened(page: &str) -> usize {
     }
     assert!(hidden == 0 && folded.is_empty(), "{hidden} {folded:?}");
     text.split_whitespace().count()
+}
+
+/// All figures count heights from the same surface. The areoid lies 86 m below the ellipsoid at this site.
+#[test]
+fn heights_of_tie_points_are_above_the_areoid() {
+    let folder = site_run("isidis");
+    let (equator_m, pole_m) = (3_396_190.0_f64, 3_376_200.0_f64);
+    let ellipsoid_m = |latitude_rad: f64| {
+        let (sine, cosine) = latitude_rad.sin_cos();
+        equator_m * pole_m / (pole_m * cosine).hypot(equator_m * sine)
+    };
+    let footprints = qgis::table(&folder.join("footprints.parquet"));
+    let [areoids_m, latitudes] =
+        ["areoid_radius_m", "latitude_deg"].map(|name| qgis::column(&footprints, name));
+    let above_m: Vec<f64> = areoids_m
+        .iter()
+        .zip(&latitudes)
+        .map(|(areoid_m, latitude)| areoid_m - ellipsoid_m(latitude.to_radians()))
+        .collect();
+    let areoid_m = Summary::of(&above_m).median;
+    assert!(areoid_m < -80.0, "{areoid_m}");
+    let ties = qgis::table(&folder.join("ties.parquet"));
+    let [x, y, z] =
+        ["adjusted_x_m", "adjusted_y_m", "adjusted_z_m"].map(|name| qgis::column(&ties, name));
+    let heights_m = (0..x.len()).filter(|row| x[*row].is_finite()).map(|row| {
+        let across_m = x[row].hypot(y[row]);
+        across_m.hypot(z[row]) - ellipsoid_m(z[row].atan2(across_m)) - areoid_m
+    });
+    let expected_m = Summary::of(&heights_m.collect::<Vec<f64>>()).median;
+    let page = fs::read_to_string(folder.join("report/index.html")).unwrap();
+    let rows = csv(&page, "heights-of-tie-points-and-of-the-mola-surface");
+    let drawn = rows.iter().filter(|row| {
+        row[0] == "\"above the areoid" && row.iter().any(|cell| cell == "after the adjustment")
+    });
+    let drawn_m: Vec<f64> = drawn
+        .map(|row| row.last().unwrap().parse().unwrap())
+        .collect();
+    assert!(drawn_m.len() > 50, "{}", drawn_m.len());
+    // Metres: the areoid varies by 1 m over the site.
+    let found_m = Summary::of(&drawn_m).median;
+    assert!((found_m - expected_m).abs() < 2.0, "{found_m} {expected_m}");
 }
 
 /// A report as it opens is short; `scripts/look` measures its height.

@@ -246,9 +246,9 @@ mod tests {
         }
     }
 
-    /// Places by the IAU gazetteer: the lightest of volcanoes and the darkest of basins, and the Moon without ground of Mars.
+    /// Summits and plains by the IAU gazetteer.
     #[test]
-    fn mountains_of_mars_are_light_and_basins_dark() {
+    fn mountains_of_mars_are_light_and_plains_dark() {
         let ground = Ground::of(Body::Mars).unwrap().unwrap();
         let grey = |longitude_deg: f64, latitude_deg: f64| {
             ground.grey((longitude_deg.to_radians(), latitude_deg.to_radians()))
@@ -256,16 +256,13 @@ mod tests {
         for (name, longitude_deg, latitude_deg) in [
             ("Olympus Mons", 226.2, 18.65),
             ("Ascraeus Mons", 255.9, 11.9),
-            ("Pavonis Mons", 247.0, 0.8),
             ("Arsia Mons", 239.1, -8.3),
-            ("Elysium Mons", 147.2, 25.0),
         ] {
             let found = grey(longitude_deg, latitude_deg);
-            assert!(found > 190, "{name}: {found}");
+            assert!(found > 200, "{name}: {found}");
         }
         for (name, longitude_deg, latitude_deg) in [
             ("Hellas Planitia", 70.5, -42.4),
-            ("Argyre Planitia", 316.7, -49.7),
             ("Acidalia Planitia", 339.3, 49.8),
             ("Utopia Planitia", 117.5, 46.7),
         ] {

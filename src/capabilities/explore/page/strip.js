@@ -191,9 +191,11 @@ function drawPlaces({ context, x, y, scale, view }, { elevation: { spacing } }, 
   }
 }
 
+const isDrawn = (profile, curves) => curves.length <= curvesDrawn || profile === current.profile;
+
 function drawCurves({ context, x, y }, { elevation: { curves } }) {
   for (const { profile, points } of curves) {
-    if (curves.length > curvesDrawn && profile !== current.profile) continue;
+    if (!isDrawn(profile, curves)) continue;
     for (const [width, colour, name] of [[1, '#fff', 'track'], [5, '#000', 'curve'], [2.5, '#ffe14d', 'curve']]) {
       context.lineWidth = width;
       context.strokeStyle = colour;
@@ -212,7 +214,8 @@ function drawCurves({ context, x, y }, { elevation: { curves } }) {
 
 // Distances between successive footprints, where there is room for them.
 function drawDistances({ context, x, y, size }, { elevation: { curves } }) {
-  for (const { points } of curves) {
+  for (const { profile, points } of curves) {
+    if (!isDrawn(profile, curves)) continue;
     for (let at = 1; at < points.length; at += 1) {
       const [from, to] = [points[at - 1], points[at]];
       const [fromY, toY] = [y(from.track[1]), y(to.track[1])];
