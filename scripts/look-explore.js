@@ -161,6 +161,13 @@ async function explore(browser, file, view, picture) {
       const onImage = await pointed(page, '#strip', '.image-part');
       expect(/^(Footprint|Tie point)/.test(onImage?.title), 'the image does not mark the footprint of the profile');
       if (onImage) check(onImage);
+      // Zoomed in about it, distances to its neighbours have room.
+      await page.mouse.wheel(0, -300);
+      await page.waitForTimeout(500);
+      const without = await drawn(page, '#strip canvas');
+      await page.check('#distances');
+      expect(await drawn(page, '#strip canvas') !== without, 'the image shows no distances between footprints');
+      await page.uncheck('#distances');
     }
   }
 
