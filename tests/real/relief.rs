@@ -1,4 +1,10 @@
 //! The ground of maps of sites against the topography of Mars from which it is derived.
+#![allow(
+    clippy::unwrap_used,
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "helpers of tests may fail loudly; rows and columns are small numbers"
+)]
 
 use std::fs;
 
@@ -86,7 +92,7 @@ fn the_ground_of_maps_lies_where_the_topography_of_mars_states() {
         let row = ((90.0 - latitude_deg) / 180.0 * rows).clamp(0.0, rows - 1.0);
         f64::from(greys[row as usize * size.width as usize + column as usize])
     };
-    let in_place = explained(&megdr, &grey);
+    let in_place = explained(&megdr, grey);
     println!("explained in place: {in_place:.3}");
     assert!(in_place > 0.78, "{in_place}");
     for (name, moved) in [

@@ -140,6 +140,34 @@ fn document_of(bytes: &[u8]) -> zip::result::ZipResult<String> {
 /// The layers of the products that were written, from the top of the map to its bottom.
 fn layers(of: &Context) -> Result<Vec<Layer>> {
     let site = of.site;
+    let mut layers = vector_layers(of);
+    let mosaics = mosaics(of)?;
+    // Orthoimages are below the mosaic that is made of them.
+    let is_alone = mosaics.is_empty();
+    layers.extend(mosaics);
+    for orthoimage in Orthoimage::best(site.book)? {
+        let id = &site.images[orthoimage.account.image].times.id;
+        let path = format!("images/{id}/orthoimage.tif");
+        if !is_written(of, &path) {
+            continue;
+        }
+        layers.push(Layer {
+            name: format!("Orthoimage {id}"),
+            source: source(&path),
+            wkt: equirectangular_wkt(site.config.body, orthoimage.account.parallel_rad),
+            is_shown: is_alone,
+            form: Form::Brightness {
+                range: stretch(&orthoimage.brightness),
+            },
+        });
+    }
+    layers.extend(terrain(of)?);
+    Ok(layers)
+}
+
+/// Points, arrows and lines, from the top of the map.
+fn vector_layers(of: &Context) -> Vec<Layer> {
+    let site = of.site;
     let terms = site.config.terms();
     let geographic = || crs_wkt(site.config.body);
     let mut layers = Vec::new();
@@ -194,54 +222,42 @@ fn layers(of: &Context) -> Result<Vec<Layer>> {
             form: Form::Contours { label: "height_m" },
         });
     }
-    let mosaics = mosaics(of)?;
-    // Orthoimages are below the mosaic that is made of them.
-    let is_alone = mosaics.is_empty();
-    layers.extend(mosaics);
-    for orthoimage in Orthoimage::best(site.book)? {
-        let id = &site.images[orthoimage.account.image].times.id;
-        let path = format!("images/{id}/orthoimage.tif");
-        if !is_written(of, &path) {
-            continue;
+    layers
+}
+
+/// The terrain model in colours, and shaded below it; empty without one.
+fn terrain(of: &Context) -> Result<Vec<Layer>> {
+    let site = of.site;
+    let Some(terrain) = site.find::<Surface>()?.filter(|_| is_written(of, TERRAIN)) else {
+        return Ok(Vec::new());
+    };
+    let grid = &terrain.model.heights;
+    let other = TERRAIN_ABOVE.into_iter().find(|path| is_written(of, path));
+    let other = other.zip(terrain.account.reference.as_ref());
+    let (path, surface, heights_m) = match other {
+        Some((path, reference)) => {
+            let areoid = site.config.terms().areoid();
+            (path, areoid, reference.heights_m(grid))
         }
-        layers.push(Layer {
-            name: format!("Orthoimage {id}"),
-            source: source(&path),
-            wkt: equirectangular_wkt(site.config.body, orthoimage.account.parallel_rad),
-            is_shown: is_alone,
-            form: Form::Brightness {
-                range: stretch(&orthoimage.brightness),
-            },
-        });
-    }
-    if let Some(terrain) = site.find::<Surface>()?.filter(|_| is_written(of, TERRAIN)) {
-        let grid = &terrain.model.heights;
-        let other = TERRAIN_ABOVE.into_iter().find(|path| is_written(of, path));
-        let other = other.zip(terrain.account.reference.as_ref());
-        let (path, surface, heights_m) = match other {
-            Some((path, reference)) => (path, terms.areoid(), reference.heights_m(grid)),
-            None => (TERRAIN, "map sphere", grid.heights_m.clone()),
-        };
-        let known = heights_m.iter().filter(|height| height.is_finite());
-        let range = range(known.map(|height| f64::from(*height)));
-        let heights = source(path);
-        let wkt = equirectangular_wkt(site.config.body, terrain.model.parallel_rad);
-        layers.push(Layer {
-            name: format!("Terrain model, height above the {surface} in m"),
-            source: heights.clone(),
-            wkt: wkt.clone(),
-            is_shown: true,
-            form: Form::Terrain { range },
-        });
-        layers.push(Layer {
-            name: "Terrain model, shaded".to_owned(),
-            source: heights,
-            wkt,
-            is_shown: true,
-            form: Form::Shaded,
-        });
-    }
-    Ok(layers)
+        None => (TERRAIN, "map sphere", grid.heights_m.clone()),
+    };
+    let known = heights_m.iter().filter(|height| height.is_finite());
+    let range = range(known.map(|height| f64::from(*height)));
+    let wkt = equirectangular_wkt(site.config.body, terrain.model.parallel_rad);
+    let layer = |name: String, form: Form| Layer {
+        name,
+        source: source(path),
+        wkt: wkt.clone(),
+        is_shown: true,
+        form,
+    };
+    Ok(vec![
+        layer(
+            format!("Terrain model, height above the {surface} in m"),
+            Form::Terrain { range },
+        ),
+        layer("Terrain model, shaded".to_owned(), Form::Shaded),
+    ])
 }
 
 /// The images of the mosaic, the mosaic, and the one before the adjustment.
