@@ -117,4 +117,26 @@ mod tests {
         let layout = copy.query_row("PRAGMA user_version", [], |row| row.get::<_, i64>(0));
         assert_eq!(layout.unwrap(), 1);
     }
+
+    #[test]
+    fn a_site_of_layout_2_has_a_body() {
+        let folder = tempfile::tempdir().unwrap();
+        drop(Database::open(folder.path()).unwrap());
+        let former = "ALTER TABLE site DROP COLUMN body;
+            INSERT INTO site (name, file, config_blake3, enabled) VALUES ('a', 'a.toml', '', 1);
+            PRAGMA user_version = 2";
+        let path = folder.path().join(DATABASE);
+        Connection::open(&path)
+            .unwrap()
+            .execute_batch(former)
+            .unwrap();
+        let database = Database::open(folder.path()).unwrap();
+        let found = database.read(|connection| {
+            connection.prepare("SELECT checked_ms, damaged FROM run")?;
+            let sql = "SELECT body FROM site WHERE name = 'a'";
+            Ok(connection.query_row(sql, [], |row| row.get::<_, String>(0))?)
+        });
+        assert_eq!(found.unwrap(), "mars");
+        assert!(folder.path().join("before-layout-3.db").is_file());
+    }
 }
