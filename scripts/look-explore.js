@@ -105,6 +105,17 @@ async function explore(browser, file, view, picture) {
   }
   expect(controls.every((id) => reached.has(id)), `not reached by keyboard: ${controls.filter((id) => !reached.has(id))}`);
 
+  // What is drawn on the map can be switched.
+  for (const id of ['footprints', 'outlines', 'windows']) {
+    const toggle = page.locator(`#${id}`);
+    if (!await toggle.count()) continue;
+    const on = await drawn(page, '#map canvas');
+    await toggle.uncheck();
+    const off = await drawn(page, '#map canvas');
+    await toggle.check();
+    expect(on !== off && on === await drawn(page, '#map canvas'), `the switch ${id} has no effect on the map`);
+  }
+
   // Profile: keys choose a footprint, and map, image and values follow.
   let checked = 0;
   const check = (of) => {
@@ -150,6 +161,13 @@ async function explore(browser, file, view, picture) {
       const onImage = await pointed(page, '#strip', '.image-part');
       expect(/^(Footprint|Tie point)/.test(onImage?.title), 'the image does not mark the footprint of the profile');
       if (onImage) check(onImage);
+      // Zoomed in about it, distances to its neighbours have room.
+      await page.mouse.wheel(0, -300);
+      await page.waitForTimeout(500);
+      const without = await drawn(page, '#strip canvas');
+      await page.check('#distances');
+      expect(await drawn(page, '#strip canvas') !== without, 'the image shows no distances between footprints');
+      await page.uncheck('#distances');
     }
   }
 

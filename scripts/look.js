@@ -31,6 +31,22 @@ function overprints() {
   return pairs;
 }
 
+// The limits of a report as it opens: its height, and what its first screen shows: half of the picture at least.
+function sizes() {
+  const problems = [];
+  const high = document.documentElement.scrollHeight;
+  if (high > 6000) problems.push(`${high} pixels high; expected at most 6000`);
+  const seen = (what, selector, share) => {
+    const box = document.querySelector(selector)?.getBoundingClientRect();
+    const down = box ? Math.round(box.top + share * box.height) : 0;
+    if (down > innerHeight) problems.push(`${what}: ${down} pixels from the top; the first screen has ${innerHeight}`);
+  };
+  seen('the middle of the picture', '.first figure svg', 0.5);
+  seen('the end of the key numbers', '.numbers', 1);
+  seen('the end of the downloads', '.downloads', 1);
+  return problems;
+}
+
 const nameOf = (file) => path.resolve(file).split(path.sep).slice(-3).filter(Boolean).join('-').replace(/\.html$/, '');
 
 async function look(browser, file, view) {
@@ -49,6 +65,7 @@ async function look(browser, file, view) {
     if (!/^(file|data):/.test(request.url())) problems.push(`asks for ${request.url()}`);
   });
   await page.goto('file://' + path.resolve(file));
+  if (view.width === 1440 && /report\/index\.html$/.test(file)) problems.push(...await page.evaluate(sizes));
   // Folded content is checked too.
   await page.evaluate(() => document.querySelectorAll('details').forEach((folded) => { folded.open = true; }));
   const wide = await page.evaluate(() => document.documentElement.scrollWidth);

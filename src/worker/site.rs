@@ -111,6 +111,7 @@ impl Worker {
                 })
                 .collect(),
             bounds_deg: bounds.map(|edges| edges.map(|edge| edge / RADIANS_PER_DEGREE)),
+            body: site.body,
         })
     }
 

@@ -101,6 +101,24 @@ fn values_are_those_of_the_tables() {
     ] {
         assert_same(&of_page[name], &texts(name), name);
     }
+    // The search window, as its file states it: 175.05 to 175.55 degrees east, 15.1 to 14.1 degrees south.
+    let windows = values["windows"].as_array().unwrap();
+    assert_eq!(
+        (windows.len(), &windows[0]["id"]),
+        (1, &"gusev_crater".into())
+    );
+    let ring = windows[0]["ring_deg"].as_array().unwrap();
+    for (axis, [least, most]) in [[175.05, 175.55], [-15.1, -14.1]].into_iter().enumerate() {
+        let of = ring.iter().map(|corner| corner[axis].as_f64().unwrap());
+        let ends = of.fold((f64::MAX, f64::MIN), |ends, value| {
+            (ends.0.min(value), ends.1.max(value))
+        });
+        // Degrees: rounded to the sixth decimal.
+        assert!(
+            (ends.0 - least).abs() < 1e-6 && (ends.1 - most).abs() < 1e-6,
+            "{ends:?}"
+        );
+    }
     let registered = rows(&folder.join("registered_footprints.csv"));
     for image in values["registered"].as_array().unwrap() {
         let id =
@@ -267,7 +285,10 @@ fn the_page_is_complete_without_a_network_and_the_same_every_time() {
     let script = between(&page, "<script>", "</script>");
     let hash = STANDARD.encode(Sha256::digest(script.as_bytes()));
     assert!(page.contains(&format!("default-src 'none'; script-src 'sha256-{hash}';")));
-    let parts = page.replace(script, "");
+    // The picture of the globe is in the page.
+    let parts = page
+        .replace(script, "")
+        .replace("src=\"data:image/png;base64,", "");
     for resource in ["src=", "<link", "@import", "http:", "<iframe"] {
         assert!(!parts.contains(resource), "{resource}");
     }

@@ -11,6 +11,7 @@ use areograph::{
     stage::{Output, Provenance, Round},
     stages::{
         map_surface::{ShotComparison, Surface, SurfaceAccount, SurfaceLook, SurfaceModel},
+        mosaic_images::{Mosaic, MosaicAccount, MosaicPart},
         rectify_images::{Orthoimage, OrthoimageAccount, OrthoimageLook},
     },
 };
@@ -22,7 +23,7 @@ use tiff::{
 
 use crate::{
     common::{self, products_site::Site},
-    qgis::{in_qgis, layers_refer_to_products},
+    qgis::{document, in_qgis, layers_refer_to_products},
 };
 
 /// Rows and columns of the orthoimage, and of the terrain model, whose cells are twice as large.
@@ -113,6 +114,32 @@ pub(crate) fn orthoimage() -> Orthoimage {
     }
 }
 
+/// The orthoimage alone as a mosaic.
+fn mosaic() -> Mosaic {
+    let Orthoimage {
+        account,
+        brightness,
+        ..
+    } = orthoimage();
+    Mosaic {
+        account: MosaicAccount {
+            map: account.map,
+            parallel_rad: account.parallel_rad,
+            cell_m: account.cell_m,
+            images: vec![MosaicPart {
+                image: 0,
+                tone: [1.0, 0.0],
+                cells: 47,
+            }],
+            seams: Vec::new(),
+            look: account.look,
+            detail: None,
+        },
+        sources: brightness.iter().map(|of| u8::from(*of > 0)).collect(),
+        brightness,
+    }
+}
+
 pub(crate) fn output<T>(value: T) -> Output<T> {
     let nowhere = Provenance {
         blake3: String::new(),
@@ -131,6 +158,9 @@ fn files_and_page_state_what_was_computed() {
             .unwrap();
         let shown = |of: &Vec<Orthoimage>| of.iter().map(Orthoimage::without_cells).collect();
         book.enter_heavy(Round::Initial, output(orthoimages.clone()), shown)
+            .unwrap();
+        let without = |of: &Option<Mosaic>| of.as_ref().map(Mosaic::without_cells);
+        book.enter_heavy(Round::Initial, output(Some(mosaic())), without)
             .unwrap();
         let site = SiteProducts {
             book: &book,
@@ -184,22 +214,51 @@ fn files_and_page_state_what_was_computed() {
     assert!(row.contains("not known"), "{row}");
 }
 
-/// The orthoimage, and below it the terrain model twice, on the map of their files.
+/// The mosaic with its images, the orthoimage, and below it the terrain model twice, on the map of their files.
 fn rasters_are_layers_of_the_project(project: &Path, id: &str) {
     let sources = layers_refer_to_products(project);
     let orthoimage = format!("../images/{id}/orthoimage.tif");
     let rasters = [
+        "../mosaic_source.tif",
+        "../mosaic.tif",
         &*orthoimage,
         "../surface_above_sphere.tif",
         "../surface_above_sphere.tif",
     ];
-    assert_eq!(sources[sources.len() - 3..], rasters);
+    assert_eq!(sources[sources.len() - 5..], rasters);
+    let text = document(project);
+    // The colours of the images have their names, and the mosaic is shown in place of the orthoimage.
+    let palette = text.split("type=\"paletted\"").nth(1).unwrap();
+    let entry =
+        format!("<paletteEntry value=\"1\" color=\"#e69f00\" alpha=\"255\" label=\"{id}\">");
+    assert!(
+        palette.split("</pipe>").next().unwrap().contains(&entry),
+        "{palette}"
+    );
+    for (name, state) in [
+        ("Images of the mosaic", "Unchecked"),
+        ("Mosaic", "Checked"),
+        (&*format!("Orthoimage {id}"), "Unchecked"),
+    ] {
+        let entry = text.split(&format!("name=\"{name}\" ")).nth(1).unwrap();
+        let entry = entry.split('>').next().unwrap();
+        assert!(
+            entry.contains(&format!("checked=\"Qt::{state}\"")),
+            "{entry}"
+        );
+    }
     let Some(found) = in_qgis(project, "orthoimages in QGIS") else {
         return;
     };
     let layers = found["layers"].as_array().unwrap();
-    let renderers = ["singlebandgray", "singlebandpseudocolor", "hillshade"];
-    for (layer, renderer) in layers[layers.len() - 3..].iter().zip(renderers) {
+    let renderers = [
+        "paletted",
+        "singlebandgray",
+        "singlebandgray",
+        "singlebandpseudocolor",
+        "hillshade",
+    ];
+    for (layer, renderer) in layers[layers.len() - 5..].iter().zip(renderers) {
         assert_eq!(
             (&layer["valid"], &layer["renderer"]),
             (&json!(true), &json!(renderer))

@@ -17,7 +17,7 @@ use serde_json::Value;
 const RADIUS_M: f64 = 3_396_190.0;
 
 /// The document of a project.
-fn document(project: &Path) -> String {
+pub(crate) fn document(project: &Path) -> String {
     let mut archive = zip::ZipArchive::new(File::open(project).unwrap()).unwrap();
     assert_eq!(archive.len(), 1);
     let mut text = String::new();
@@ -131,8 +131,16 @@ fn qgis_opens_the_project_and_draws_every_layer() {
 /// Line and sample in an image, and metres towards east and north on the ground.
 type Pair = ([f64; 2], [f64; 2]);
 
+/// The rows of a small table.
+pub(crate) fn table(path: &Path) -> arrow_array::RecordBatch {
+    let file = File::open(path).unwrap();
+    let reader = ParquetRecordBatchReaderBuilder::try_new(file).unwrap();
+    let reader = reader.with_batch_size(1 << 20).build();
+    reader.unwrap().next().unwrap().unwrap()
+}
+
 /// Real numbers of a column, NaN where missing.
-fn column(table: &arrow_array::RecordBatch, name: &str) -> Vec<f64> {
+pub(crate) fn column(table: &arrow_array::RecordBatch, name: &str) -> Vec<f64> {
     let values = table
         .column_by_name(name)
         .unwrap()
@@ -163,15 +171,7 @@ fn fitted(points: &[Pair]) -> Matrix2<f64> {
 #[test]
 fn residuals_on_the_ground_agree_with_places_of_tie_points() {
     let folder = site_run("gusev_crater");
-    let file = File::open(folder.join("ties.parquet")).unwrap();
-    let reader = ParquetRecordBatchReaderBuilder::try_new(file).unwrap();
-    let table = reader
-        .with_batch_size(1 << 20)
-        .build()
-        .unwrap()
-        .next()
-        .unwrap()
-        .unwrap();
+    let table = table(&folder.join("ties.parquet"));
     let images = table.column_by_name("image").unwrap().as_string::<i32>();
     let [lines, samples, longitudes, latitudes] = [
         "line",

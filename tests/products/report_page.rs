@@ -7,7 +7,8 @@
 )]
 
 use crate::common::{
-    page::{lead, section},
+    mission::site_run,
+    page::{csv, lead, section},
     products_site as fixture,
 };
 
@@ -15,6 +16,8 @@ use std::{collections::BTreeSet, fs, path::Path};
 
 use areograph::{capabilities, geom::statistics::Summary, stages::judge::CheckKind};
 use areograph_testing::replace;
+
+use crate::qgis;
 use fixture::{SHOTS, Site};
 
 /// The page, also left below `target`, where a person may look at it.
@@ -188,6 +191,93 @@ fn a_gap_in_attitude_is_seen_and_measured() {
     // One red bar for the gap; the swatch of its key is not part of the picture.
     let svg = picture.split("</svg>").next().unwrap();
     assert_eq!(svg.matches("fill=\"#C10019\"").count(), 1);
+}
+
+/// Words that a page shows as it opens, without tables, figures drawn as SVG, and text that is folded.
+fn words_as_opened(page: &str) -> usize {
+    let mut text = String::new();
+    // Elements whose text is not shown, and how many of them are open at a place.
+    let (mut hidden, mut folded, mut summary) = (0_i32, Vec::new(), false);
+    let body = page.split("<body").nth(1).unwrap();
+    for part in body.split('<').skip(1) {
+        let (tag, after) = part.split_once('>').unwrap();
+        let name = tag
+            .split([' ', '/'])
+            .find(|of| !of.is_empty())
+            .unwrap_or("");
+        let is_end = tag.starts_with('/');
+        match name {
+            "table" | "svg" | "style" => hidden += if is_end { -1 } else { 1 },
+            "details" if is_end => {
+                folded.pop();
+            }
+            "details" => folded.push(!tag.split(' ').any(|of| of == "open")),
+            "summary" => summary = !is_end,
+            _ => {}
+        }
+        let own = folded.len() - usize::from(summary && !folded.is_empty());
+        if hidden == 0 && !folded[..own].iter().any(|is_folded| *is_folded) {
+            text += after;
+        }
+        text.push(' ');
+    }
+    assert!(hidden == 0 && folded.is_empty(), "{hidden} {folded:?}");
+    text.split_whitespace().count()
+}
+
+/// All figures count heights from the same surface. The areoid lies 86 m below the ellipsoid at this site.
+#[test]
+fn heights_of_tie_points_are_above_the_areoid() {
+    let folder = site_run("isidis");
+    let (equator_m, pole_m) = (3_396_190.0_f64, 3_376_200.0_f64);
+    let ellipsoid_m = |latitude_rad: f64| {
+        let (sine, cosine) = latitude_rad.sin_cos();
+        equator_m * pole_m / (pole_m * cosine).hypot(equator_m * sine)
+    };
+    let footprints = qgis::table(&folder.join("footprints.parquet"));
+    let [areoids_m, latitudes] =
+        ["areoid_radius_m", "latitude_deg"].map(|name| qgis::column(&footprints, name));
+    let above_m: Vec<f64> = areoids_m
+        .iter()
+        .zip(&latitudes)
+        .map(|(areoid_m, latitude)| areoid_m - ellipsoid_m(latitude.to_radians()))
+        .collect();
+    let areoid_m = Summary::of(&above_m).median;
+    assert!(areoid_m < -80.0, "{areoid_m}");
+    let ties = qgis::table(&folder.join("ties.parquet"));
+    let [x, y, z] =
+        ["adjusted_x_m", "adjusted_y_m", "adjusted_z_m"].map(|name| qgis::column(&ties, name));
+    let heights_m = (0..x.len()).filter(|row| x[*row].is_finite()).map(|row| {
+        let across_m = x[row].hypot(y[row]);
+        across_m.hypot(z[row]) - ellipsoid_m(z[row].atan2(across_m)) - areoid_m
+    });
+    let expected_m = Summary::of(&heights_m.collect::<Vec<f64>>()).median;
+    let page = fs::read_to_string(folder.join("report/index.html")).unwrap();
+    let rows = csv(&page, "heights-of-tie-points-and-of-the-mola-surface");
+    let drawn = rows.iter().filter(|row| {
+        row[0] == "\"above the areoid" && row.iter().any(|cell| cell == "after the adjustment")
+    });
+    let drawn_m: Vec<f64> = drawn
+        .map(|row| row.last().unwrap().parse().unwrap())
+        .collect();
+    assert!(drawn_m.len() > 50, "{}", drawn_m.len());
+    // Metres: the areoid varies by 1 m over the site.
+    let found_m = Summary::of(&drawn_m).median;
+    assert!((found_m - expected_m).abs() < 2.0, "{found_m} {expected_m}");
+}
+
+/// A report as it opens is short; `scripts/look` measures its height.
+#[test]
+fn a_report_opens_with_at_most_1200_words() {
+    let few = "<body><p>one two</p><details><summary>three</summary>four</details><details open><summary>five</summary>six \
+               <table><td>seven</td></table></details><svg>eight</svg>";
+    assert_eq!(words_as_opened(few), 5);
+    for site in ["eos_chasma", "gusev_context", "gusev_crater", "isidis"] {
+        let page = fs::read_to_string(site_run(site).join("report/index.html")).unwrap();
+        let words = words_as_opened(&page);
+        println!("{site}: {words} words");
+        assert!((100..=1200).contains(&words), "{site}: {words}");
+    }
 }
 
 #[test]

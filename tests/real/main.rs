@@ -16,6 +16,7 @@ mod real_ranges;
 mod real_registration;
 mod real_site;
 mod real_ties;
+mod relief;
 mod support_data;
 mod table_shots;
 mod usgscsm;

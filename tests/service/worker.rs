@@ -19,6 +19,7 @@ use std::{
 };
 
 use areograph::{
+    body::Body,
     service::worker::{
         parent::{Ended, Heard, How, Times, WorkerLimits, work},
         process::ProcessIdentity,
@@ -267,6 +268,7 @@ fn a_run_is_kept_once() {
 fn a_plan_tells_all_files_and_where_the_windows_lie() {
     let case = Case::new();
     let planned = plan(&case);
+    assert_eq!(planned.body, Body::Mars);
     let [west, south, east, north] = planned.bounds_deg.unwrap();
     for (found, expected) in [(west, 87.5), (south, 4.0), (east, 88.5), (north, 5.0)] {
         // Rounding of radians.

@@ -244,6 +244,19 @@ impl Body {
         &self.file().map
     }
 
+    /// The ground of the whole body as a grey picture for maps of sites, PNG: shaded, from 0° eastwards to 360° and from
+    /// 90° N to 90° S, every degree of longitude and latitude of the same size. Only Mars has one.
+    ///
+    /// # Source
+    /// MOLA MEGDR at four cells per degree (`MGS-M-MOLA-5-MEGDR-L3-V1.0`, NASA PDS); `scripts/relief.py` writes the file.
+    #[must_use]
+    pub const fn relief(self) -> Option<&'static [u8]> {
+        match self {
+            Self::Mars => Some(include_bytes!("../../../config/bodies/mars_relief.png")),
+            Self::Moon => None,
+        }
+    }
+
     /// Tolerance of body rotations of support data against the formula of the products' frame, radians.
     #[must_use]
     pub fn rotation_tolerance_rad(self) -> f64 {

@@ -7,6 +7,7 @@ use std::cmp::Reverse;
 use super::{
     html::{Markup, counted, html},
     map::relief,
+    numbers::above_words,
     plots::{Extent, Panel, PanelPicture, Plot, Series, figure, thinned},
 };
 use areograph_base::error::Result;
@@ -137,15 +138,9 @@ impl Strip<'_> {
             }),
             ..Panel::of("sample", series(|of| &of.places))
         };
-        // A panel has names that are known when the program is built.
-        let above = if terms.has_areoid {
-            "above the areoid, m"
-        } else {
-            "above the ellipsoid, m"
-        };
         let ground = Panel {
             height: 240,
-            ..Panel::of(above, series(|of| &of.heights_m))
+            ..Panel::of(above_words(terms.has_areoid), series(|of| &of.heights_m))
         };
         let count = self.latest().count;
         let thinned = match count.div_ceil(DOTS) {

@@ -93,11 +93,13 @@ pub use terrain_pictures::terrain_pictures;
 pub mod parts {
     pub use super::{
         html::{Cell, Column, Table, folded_unless, link, paragraph},
+        map::globe::globe,
         map::{
             relief::{COLOURS as HEIGHT_COLOURS, relief_of_shots, shade},
             round_length_m,
         },
         numbers::{signed, whole},
+        outlines::{Outline, windows as window_outlines},
         overlays::picture_of,
         plots::label,
     };

@@ -1,6 +1,7 @@
 //! Map of the site: shaded ground by its own shots, profiles by name, windows, image outlines, tie points.
 
 mod ellipses;
+pub(super) mod globe;
 pub(super) mod keys;
 pub(super) mod labels;
 mod legend;
@@ -101,6 +102,7 @@ fn figure(site: &SiteProducts, shown: Shown, only: bool) -> Result<Markup> {
         let (width, height) = (f64::from(WIDTH), f64::from(sheet.height()));
         place_behind(&mut svg, &relief.svg(sheet.heights_m, width, height)?);
     }
+    place_behind(&mut svg, &sheet.legend().globe().relief(site.config.body)?);
     let mut title = "Windows, footprints and images".to_owned();
     if !only {
         title += &format!(": {}", names(&sheet.shown.windows));
@@ -257,15 +259,18 @@ impl Sheet {
         let frame = [(0, 0), (WIDTH as i32 - 1, self.height() - 1)];
         area.draw(&Rectangle::new(frame, INK.stroke_width(2)))?;
         self.names(&lines).0.draw(area)?;
+        self.legend().draw(area)
+    }
+
+    fn legend(&self) -> Legend<'_> {
         let has_shots = !self.shown.rows.is_empty();
-        let legend = Legend {
+        Legend {
             top: self.height(),
             view: &self.view,
             heights_m: has_shots.then_some(self.heights_m),
             areoid: self.areoid,
             centre_rad: (self.map.longitude_rad(), self.map.latitude_rad()),
-        };
-        legend.draw(area)
+        }
     }
 
     /// Dark dots on a light band: both are the same on light and dark pages, as the ground is, which may be either.

@@ -52,6 +52,15 @@ fn spaced(text: &str) -> String {
     spaced + rest
 }
 
+/// Name of an axis of heights; names of panels are known when the program is built.
+pub(super) const fn above_words(has_areoid: bool) -> &'static str {
+    if has_areoid {
+        "above the areoid, m"
+    } else {
+        "above the ellipsoid, m"
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -10,11 +10,13 @@ use areograph_products::SiteProducts;
 const EDGE_POINTS: u32 = 72;
 
 /// A named ring of (longitude, latitude), radians.
-pub(super) struct Outline {
-    pub(super) name: String,
+pub struct Outline {
+    /// Identifier of the window or image.
+    pub name: String,
     /// Whether a map has its name.
     pub(super) is_named: bool,
-    pub(super) ring: Vec<(f64, f64)>,
+    /// Its corners, and points between them where edges are bent.
+    pub ring: Vec<(f64, f64)>,
 }
 
 /// Outlines of the images on maps, if their complete edge is on the ground.
@@ -33,8 +35,9 @@ pub(super) fn images(site: &SiteProducts) -> Vec<Outline> {
     many::drawn(site).iter().filter_map(outline).collect()
 }
 
-/// Rings of the windows.
-pub(super) fn windows(site: &SiteProducts) -> Vec<Outline> {
+/// Rings of the windows; the outline of an image stands for a window that is the view of this image.
+#[must_use]
+pub fn windows(site: &SiteProducts) -> Vec<Outline> {
     let rings = site.config.windows.iter().flat_map(|window| {
         let rings: Vec<Vec<(f64, f64)>> = match &window.shape {
             WindowShape::Box {

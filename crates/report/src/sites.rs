@@ -168,14 +168,14 @@ impl SiteSummary {
         DateTime::parse_from_rfc3339(&self.finished_utc).ok()
     }
 
-    /// Age of the products relative to the newest ones of all sites.
+    /// Age of the products relative to the newest ones of all sites; empty for these.
     fn age(&self, newest: Option<DateTime<FixedOffset>>) -> String {
         let older = newest
             .zip(self.finished())
             .map(|(newest, own)| newest - own);
         older.map_or_else(String::new, |older| {
             match (older.num_days(), older.num_hours(), older.num_minutes()) {
-                (0, 0, 0) => "newest".to_owned(),
+                (0, 0, 0) => String::new(),
                 (0, 0, minutes) => format!("{minutes} min before the newest"),
                 (0, hours, _) => format!("{hours} h before the newest"),
                 (days, ..) => format!("{} before the newest", counted(days as usize, "day")),
@@ -263,9 +263,14 @@ fn cells(site: &SiteLine, newest: Option<DateTime<FixedOffset>>) -> Vec<Cell> {
         |mean_m| Cell::from(number(mean_m, 2)).traced(figure_place("range_mean_m", mean_m)),
     ));
     cells.push(summary.trend());
+    // Only what distinguishes a site from the others.
+    let age = Some(summary.age(newest)).filter(|age| !age.is_empty());
+    let of_another = (summary.version != env!("CARGO_PKG_VERSION"))
+        .then(|| format!("areograph {}", summary.version));
+    let remarks: Vec<String> = age.into_iter().chain(of_another).collect();
     let published = html! {
         span.short { (minute(&summary.finished_utc)) }
-        br; small { (summary.age(newest)) ", areograph " (summary.version) }
+        @if !remarks.is_empty() { br; small { (remarks.join(", ")) } }
     };
     cells.push(published.into());
     cells
@@ -379,8 +384,8 @@ mod tests {
         assert!(trend.contains("INVALID as before<br>"));
         assert!(trend.contains("range − distance −1.25 m"));
         assert!(trend.contains("data-from=\"/figures/range_mean_m*-1\""));
-        // All of the three ran at the same time; an older one is marked.
-        assert_eq!(page.matches("newest, areograph 1").count(), 3);
+        // All of the three ran at the same time, by another version; an older one is marked.
+        assert_eq!(page.matches("<small>areograph 1</small>").count(), 3);
         let mut older = summary("valid", &[]);
         older.finished_utc = "2025-12-29T21:00:00Z".to_owned();
         let newest = summary("valid", &[]).finished();

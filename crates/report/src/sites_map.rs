@@ -1,4 +1,4 @@
-//! A map of a body with all its sites in an output folder, by verdict, over its largest features.
+//! A map of a body with all its sites in an output folder, by verdict, over its relief or its largest features.
 
 mod features;
 
@@ -11,7 +11,8 @@ use super::{
     html::{Markup, Tone},
     map::labels::{self, LETTERS, Labels, write},
     plots::{
-        COLOURS, Canvas, Drawn, GREY, GRID, INK, Key, MARK, SOFT, WIDTH, drawn, figure_html, quoted,
+        COLOURS, Canvas, Drawn, GREY, GRID, INK, Key, MARK, SOFT, WIDTH, drawn, figure_html, image,
+        place_behind, quoted,
     },
 };
 use areograph_base::{body::Body, error::Result};
@@ -42,6 +43,10 @@ const RING: i32 = 4;
 /// Number of corners of the outline of a feature.
 const CORNERS: i32 = 60;
 
+/// Describes the ground of Mars.
+const GROUND: &str = "Ground: MOLA heights, shaded, in cells of one degree (MEGDR, NASA PDS), east longitude and areocentric \
+                      latitude.";
+
 /// A site on the map.
 pub(super) struct Place<'a> {
     pub(super) name: &'a str,
@@ -61,12 +66,14 @@ pub(super) fn figure(body: Body, places: &[Place]) -> Result<Markup> {
     let features: Vec<&Feature> = FEATURES.iter().filter(|of| of.body == body).collect();
     let (names, unnamed) = names(places, &features);
     let is_seen = |of: &&Feature| match of.kind {
-        Kind::Extent(_) => true,
+        // Discs stand for large features where the ground is not drawn.
+        Kind::Extent(_) => body.relief().is_none(),
         // A ring without a name has no meaning.
         Kind::Landing => names.placed.iter().any(|label| label.text == of.name),
     };
     let seen: Vec<&Feature> = features.into_iter().filter(is_seen).collect();
-    let svg = drawn(HEIGHT as u32, |area| draw(places, &seen, &names, area))?;
+    let mut svg = drawn(HEIGHT as u32, |area| draw(places, &seen, &names, area))?;
+    place_behind(&mut svg, &ground(body));
     let mut csv = "site,longitude_deg,latitude_deg\n".to_owned();
     for place in places {
         let (longitude, latitude) = place.place_deg;
@@ -78,10 +85,14 @@ pub(super) fn figure(body: Body, places: &[Place]) -> Result<Markup> {
         Key::colour("valid with remarks (triangle)", REMARKS),
         Key::mark("invalid or failed (cross)"),
     ];
-    let mut words = "Centres of the first windows of the sites; sites whose window is an outline are listed in the \
-                     table only. Grey: large \
-                     features of the ground with their extent (IAU gazetteer, whole degrees), and landing sites (rings)."
-        .to_owned();
+    let of_ground = match body.relief() {
+        Some(_) => GROUND,
+        None => "Grey: large features with their extent, whole degrees.",
+    };
+    let mut words = format!(
+        "Centres of the first windows of the sites; sites whose window is an outline are listed in the table only. \
+         {of_ground} Names of features by the IAU gazetteer; rings: landing sites."
+    );
     if !unnamed.is_empty() {
         words += &format!(" Not labelled for lack of space: {}.", unnamed.join(", "));
     }
@@ -92,6 +103,13 @@ pub(super) fn figure(body: Body, places: &[Place]) -> Result<Markup> {
         &words,
         &csv,
     ))
+}
+
+/// The ground of a body as an element of the SVG of a map; empty where its relief is not known.
+fn ground(body: Body) -> String {
+    let edges = [LEFT, TOP, MAP_WIDTH, MAP_HEIGHT].map(f64::from);
+    body.relief()
+        .map_or_else(String::new, |png| image(edges, png))
 }
 
 /// A position on the map; positions beyond it are at its edge.
@@ -169,12 +187,20 @@ fn draw<'a>(
         .flat_map(|tone| places.iter().filter(move |place| place.tone == tone));
     for place in sorted {
         let (x, y) = pixel(place.place_deg);
+        // A light edge sets marks off any ground.
         match place.tone {
-            Tone::Good => area.draw(&Circle::new((x, y), 9, COLOURS[VALID].filled()))?,
+            Tone::Good => {
+                area.draw(&Circle::new((x, y), 11, WHITE.filled()))?;
+                area.draw(&Circle::new((x, y), 9, COLOURS[VALID].filled()))?;
+            }
             Tone::Remarks => {
+                area.draw(&TriangleMarker::new((x, y), 17, WHITE.filled()))?;
                 area.draw(&TriangleMarker::new((x, y), 13, COLOURS[REMARKS].filled()))?;
             }
-            Tone::Bad => area.draw(&Cross::new((x, y), 9, MARK.stroke_width(5)))?,
+            Tone::Bad => {
+                area.draw(&Cross::new((x, y), 10, WHITE.stroke_width(9)))?;
+                area.draw(&Cross::new((x, y), 9, MARK.stroke_width(5)))?;
+            }
         }
     }
     names.draw(area)
@@ -220,7 +246,7 @@ fn draw_lines<'a>(area: &Canvas<'a>) -> Drawn<'a> {
     for longitude in (0..=360).step_by(STEP_DEG as usize) {
         let (x, _) = pixel((f64::from(longitude), 0.0));
         let line = vec![(x, top), (x, bottom)];
-        area.draw(&PathElement::new(line, GRID.stroke_width(2)))?;
+        area.draw(&PathElement::new(line, GRID.mix(0.6).stroke_width(2)))?;
         if longitude % NAMED_DEG == 0 && longitude < 360 {
             let name = format!("{longitude}° E");
             write(area, &name, (x, bottom + FOOT / 2), HPos::Center, INK)?;
@@ -229,7 +255,7 @@ fn draw_lines<'a>(area: &Canvas<'a>) -> Drawn<'a> {
     for latitude in (STEP_DEG - 90..90).step_by(STEP_DEG as usize) {
         let (_, y) = pixel((0.0, f64::from(latitude)));
         let line = vec![(left, y), (right, y)];
-        area.draw(&PathElement::new(line, GRID.stroke_width(2)))?;
+        area.draw(&PathElement::new(line, GRID.mix(0.6).stroke_width(2)))?;
         let name = match latitude {
             0 => "0°".to_owned(),
             south if south < 0 => format!("{}° S", -south),
@@ -243,7 +269,90 @@ fn draw_lines<'a>(area: &Canvas<'a>) -> Drawn<'a> {
 
 #[cfg(test)]
 mod tests {
+    use base64::{Engine as _, engine::general_purpose::STANDARD};
+
     use super::*;
+
+    /// The numbers of an attribute of every such element of an SVG.
+    fn numbers(svg: &str, element: &str, attribute: &str) -> Vec<f64> {
+        let start = format!("<{element} ");
+        let elements = svg.split(&start).skip(1);
+        let value = |of: &str| {
+            let text = of.split(&format!("{attribute}=\"")).nth(1)?;
+            text.split('"').next()?.parse().ok()
+        };
+        elements.filter_map(value).collect()
+    }
+
+    /// The brightness of the drawn ground under the mark of a site there, as a share of the cells that are darker.
+    fn share_darker(longitude_deg: f64, latitude_deg: f64) -> f64 {
+        let site = Place {
+            name: "site",
+            tone: Tone::Good,
+            place_deg: (longitude_deg, latitude_deg),
+        };
+        let svg = figure(Body::Mars, &[site]).unwrap().0;
+        let picture = svg.split("base64,").nth(1).unwrap();
+        let picture = STANDARD.decode(picture.split('"').next().unwrap()).unwrap();
+        let mut reader = png::Decoder::new(std::io::Cursor::new(picture))
+            .read_info()
+            .unwrap();
+        let mut greys = vec![0; reader.output_buffer_size().unwrap()];
+        let size = reader.next_frame(&mut greys).unwrap();
+        let [x, y, width, height] =
+            ["x", "y", "width", "height"].map(|name| numbers(&svg, "image", name)[0]);
+        // The last circle is the mark of the site, above its edge and the rings of landing sites.
+        let [right, down] = ["cx", "cy"].map(|name| *numbers(&svg, "circle", name).last().unwrap());
+        let cell = |share: f64, count: u32| (share * f64::from(count)) as usize;
+        let (column, row) = (
+            cell((right - x) / width, size.width),
+            cell((down - y) / height, size.height),
+        );
+        let grey = greys[row * size.width as usize + column];
+        let darker = greys.iter().filter(|of| **of < grey).count();
+        darker as f64 / greys.len() as f64
+    }
+
+    /// Summits and plains by the IAU gazetteer. Where the map were mirrored or turned by half, other ground would lie there.
+    #[test]
+    fn sites_on_summits_lie_on_light_ground_and_sites_on_plains_on_dark_ground() {
+        for (name, longitude_deg, latitude_deg) in [
+            ("Olympus Mons", 226.2, 18.65),
+            ("Ascraeus Mons", 255.9, 11.9),
+            ("Arsia Mons", 239.1, -8.3),
+        ] {
+            let share = share_darker(longitude_deg, latitude_deg);
+            assert!(share > 0.98, "{name}: {share}");
+            for other_deg in [360.0 - longitude_deg, longitude_deg - 180.0] {
+                let other = share_darker(other_deg, latitude_deg);
+                assert!(other < 0.95, "{name}, {other_deg}: {other}");
+            }
+        }
+        for (name, longitude_deg, latitude_deg) in [
+            ("Hellas Planitia", 70.5, -42.4),
+            ("Utopia Planitia", 117.5, 46.7),
+        ] {
+            let share = share_darker(longitude_deg, latitude_deg);
+            assert!(share < 0.15, "{name}: {share}");
+            for other_deg in [360.0 - longitude_deg, longitude_deg + 180.0] {
+                let other = share_darker(other_deg, latitude_deg);
+                assert!(other > 0.3, "{name}, {other_deg}: {other}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_moon_has_no_ground_of_mars() {
+        let site = || Place {
+            name: "site",
+            tone: Tone::Good,
+            place_deg: (10.0, 10.0),
+        };
+        assert!(figure(Body::Mars, &[site()]).unwrap().0.contains("MEGDR"));
+        let moon = figure(Body::Moon, &[site()]).unwrap().0;
+        assert!(!moon.contains("<image") && !moon.contains("MEGDR"));
+        assert!(moon.contains("with their extent"));
+    }
 
     #[test]
     fn features_end_at_the_edge_and_go_on_at_the_other() {

@@ -1,4 +1,4 @@
-//! The first screen of a site's page: verdict, key numbers, images with footprints, checks, downloads, the map.
+//! The first screen of a site's page: verdict, key numbers, downloads, images with footprints, the map, checks.
 
 use std::borrow::Cow;
 
@@ -39,12 +39,12 @@ pub(super) fn lead(site: &SiteProducts, sections: &[&Section]) -> Result<Markup>
     let found = html! {
         (verdict(tone, &headline(site), &first_of(reasons)))
         (numbers(site))
+        (downloads(site))
         div.first {
             div {
                 (image_strips::figures(site)?)
                 (checks::of_site(site, sections))
                 (checks::untested(&site.verdict.untested))
-                (downloads(site))
             }
             div { (map::first(site)?) }
         }
@@ -102,7 +102,7 @@ fn about(site: &SiteProducts) -> Markup {
 }
 
 /// Names of the products that most users take: paths, and file names of products of images.
-pub const DOWNLOADS: [&str; 9] = [
+pub const DOWNLOADS: [&str; 10] = [
     "footprints.parquet",
     "registered_footprints.parquet",
     "registered_footprints.csv",
@@ -111,6 +111,7 @@ pub const DOWNLOADS: [&str; 9] = [
     "surface_above_areoid.tif",
     "surface_above_sphere.tif",
     "orthoimage.tif",
+    "mosaic.tif",
     "adjusted_isd.json",
 ];
 /// Offered in place of the last one if there is no adjustment.

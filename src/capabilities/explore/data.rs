@@ -17,7 +17,7 @@ use crate::{
     products::{
         Place, RegisteredFootprint, SiteProducts, on_ground_m, registered_footprints, tie_residuals,
     },
-    report::parts::HEIGHT_COLOURS,
+    report::parts::{HEIGHT_COLOURS, Outline, window_outlines},
     stages::adjust::PointKind,
     units::RADIANS_PER_DEGREE,
 };
@@ -35,10 +35,11 @@ pub(super) struct Data<'a> {
     frame: &'a str,
     /// The sphere to which heights of tie points refer.
     sphere_m: f64,
-    map: MapFrame,
+    pub(super) map: MapFrame,
     colours: [[f64; 3]; 7],
     layers: Vec<LayerEntry>,
     images: Vec<Image<'a>>,
+    windows: Vec<Window>,
     profiles: Vec<&'a str>,
     pub(super) footprints: Footprints,
     registered: Vec<Registered>,
@@ -87,6 +88,26 @@ struct Image<'a> {
     samples: u32,
     /// East longitude and latitude of its corners and edges, with the orientation from the kernels.
     outline_deg: Vec<[f64; 2]>,
+}
+
+/// An edge of a search window.
+#[derive(Serialize)]
+struct Window {
+    id: String,
+    /// East longitude and latitude.
+    ring_deg: Vec<[f64; 2]>,
+}
+
+impl Window {
+    fn of(outline: Outline) -> Self {
+        let corners = outline.ring.into_iter();
+        Self {
+            id: outline.name,
+            ring_deg: corners
+                .map(|(longitude_rad, latitude_rad)| [longitude_rad, latitude_rad].map(degrees))
+                .collect(),
+        }
+    }
 }
 
 /// Footprints, in the order of the products.
@@ -173,6 +194,7 @@ impl<'a> Data<'a> {
             colours: HEIGHT_COLOURS,
             layers: layers(site)?.iter().map(LayerEntry::of).collect(),
             images: site.images.iter().map(image).collect(),
+            windows: window_outlines(site).into_iter().map(Window::of).collect(),
             profiles: site.profiles.iter().map(|of| &*of.id).collect(),
             terrain: terrain::lines(site, &profiles)?,
             footprints,
@@ -183,9 +205,13 @@ impl<'a> Data<'a> {
     }
 }
 
+/// To millionths.
+fn degrees(angle_rad: f64) -> f64 {
+    (angle_rad / RADIANS_PER_DEGREE * 1e6).round() / 1e6
+}
+
 fn image<'a>(image: &crate::products::ImageProducts<'a>) -> Image<'a> {
     let outline = image.orientation.outline.as_deref().unwrap_or_default();
-    let degrees = |rad: f64| (rad / RADIANS_PER_DEGREE * 1e6).round() / 1e6;
     let corners = outline
         .iter()
         .map(|corner| [corner.longitude_rad, corner.latitude_rad].map(degrees));

@@ -56,6 +56,15 @@ impl MapFrame {
         })
     }
 
+    /// East longitude and latitude of its middle.
+    pub(super) fn middle_rad(&self) -> (f64, f64) {
+        let [longitude_deg, latitude_deg] = self.middle_deg;
+        (
+            longitude_deg * RADIANS_PER_DEGREE,
+            latitude_deg * RADIANS_PER_DEGREE,
+        )
+    }
+
     /// East and north of the middle, or of the pole, metres.
     pub(super) fn place_m(&self, longitude_rad: f64, latitude_rad: f64) -> (f64, f64) {
         let [middle_rad, latitude_0_rad] = self.middle_deg.map(|deg| deg * RADIANS_PER_DEGREE);

@@ -8,7 +8,10 @@ use super::data::Data;
 use crate::{
     error::Result,
     products::{SiteProducts, error::ProductError},
-    report::STYLE,
+    report::{
+        STYLE,
+        parts::{globe, window_outlines},
+    },
 };
 
 /// Leaflet 1.9.4 as published, and its licence, which every copy must contain.
@@ -53,7 +56,7 @@ pub(super) fn page(site: &SiteProducts) -> Result<(String, u64)> {
                 style { (PreEscaped(STYLE)) (PreEscaped(LEAFLET_STYLE)) (PreEscaped(OWN_STYLE)) }
             }
             body.explore {
-                (body(site))
+                (body(site, &globe(site.config.body, data.map.middle_rad())?))
                 script type="application/json" id="values" { (PreEscaped(values)) }
                 (PreEscaped(format!("<!--\nLeaflet 1.9.4\n{LEAFLET_LICENCE}-->\n")))
                 script { (PreEscaped(script)) }
@@ -76,15 +79,19 @@ fn script() -> String {
     )
 }
 
-fn body(site: &SiteProducts) -> Markup {
+fn body(site: &SiteProducts, globe: &Markup) -> Markup {
     let has_adjustment = site.adjustment().is_some();
+    let has_windows = !window_outlines(site).is_empty();
     html! {
-        header {
-            h1 { (site.config.site) }
-            p.about {
-                a href="index.html" { "Report of the site" }
-                " · " a href="#keys" { "Keys" }
+        header.opening {
+            div {
+                h1 { (site.config.site) }
+                p.about {
+                    a href="index.html" { "Report of the site" }
+                    " · " a href="#keys" { "Keys" }
+                }
             }
+            (globe)
             noscript { p.verdict.remarks { "This page needs scripts, which this browser or this server does not run. \
                 Open report/explore.html from the folder of the products." } }
         }
@@ -100,6 +107,7 @@ fn body(site: &SiteProducts) -> Markup {
                     input id="swipe" type="range" min="0" max="1000" value="500" aria-label="Boundary between the left and the right picture";
                 }
                 div.bar { (check("relief", "relief", true)) (check("footprints", "footprints", true)) (check("outlines", "outlines of images", true))
+                    @if has_windows { (check("windows", "search windows", true)) }
                     (check("ties", "tie points", false)) (check("residuals", "residuals", false))
                     span id="arrow-words" {} }
                 div.ramp { span id="ramp-low" {} i id="ramp" {} span id="ramp-high" {} }
@@ -113,7 +121,8 @@ fn body(site: &SiteProducts) -> Markup {
                 div.bar {
                     (check("before", "footprints by the kernels", true))
                     @if has_adjustment { (check("after", "adjusted", true)) }
-                    (check("curve", "elevation profile", true)) (check("measured", "tie points", false))
+                    (check("curve", "elevation profile", true)) (check("distances", "distances of footprints", false))
+                    (check("measured", "tie points", false))
                 }
                 p.note id="strip-words" {}
             }

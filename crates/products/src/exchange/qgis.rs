@@ -15,7 +15,7 @@ use std::{
 };
 
 use areograph_base::error::{Locate as _, Result};
-use areograph_stages::{map_surface::Surface, rectify_images::Orthoimage};
+use areograph_stages::{map_surface::Surface, mosaic_images::Mosaic, rectify_images::Orthoimage};
 use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter, write::SimpleFileOptions};
 
 pub use self::vectors::{on_ground_m, tie_residuals};
@@ -140,6 +140,34 @@ fn document_of(bytes: &[u8]) -> zip::result::ZipResult<String> {
 /// The layers of the products that were written, from the top of the map to its bottom.
 fn layers(of: &Context) -> Result<Vec<Layer>> {
     let site = of.site;
+    let mut layers = vector_layers(of);
+    let mosaics = mosaics(of)?;
+    // Orthoimages are below the mosaic that is made of them.
+    let is_alone = mosaics.is_empty();
+    layers.extend(mosaics);
+    for orthoimage in Orthoimage::best(site.book)? {
+        let id = &site.images[orthoimage.account.image].times.id;
+        let path = format!("images/{id}/orthoimage.tif");
+        if !is_written(of, &path) {
+            continue;
+        }
+        layers.push(Layer {
+            name: format!("Orthoimage {id}"),
+            source: source(&path),
+            wkt: equirectangular_wkt(site.config.body, orthoimage.account.parallel_rad),
+            is_shown: is_alone,
+            form: Form::Brightness {
+                range: stretch(&orthoimage.brightness),
+            },
+        });
+    }
+    layers.extend(terrain(of)?);
+    Ok(layers)
+}
+
+/// Points, arrows and lines, from the top of the map.
+fn vector_layers(of: &Context) -> Vec<Layer> {
+    let site = of.site;
     let terms = site.config.terms();
     let geographic = || crs_wkt(site.config.body);
     let mut layers = Vec::new();
@@ -194,47 +222,87 @@ fn layers(of: &Context) -> Result<Vec<Layer>> {
             form: Form::Contours { label: "height_m" },
         });
     }
-    for orthoimage in Orthoimage::best(site.book)? {
-        let id = &site.images[orthoimage.account.image].times.id;
-        let path = format!("images/{id}/orthoimage.tif");
-        if !is_written(of, &path) {
-            continue;
+    layers
+}
+
+/// The terrain model in colours, and shaded below it; empty without one.
+fn terrain(of: &Context) -> Result<Vec<Layer>> {
+    let site = of.site;
+    let Some(terrain) = site.find::<Surface>()?.filter(|_| is_written(of, TERRAIN)) else {
+        return Ok(Vec::new());
+    };
+    let grid = &terrain.model.heights;
+    let other = TERRAIN_ABOVE.into_iter().find(|path| is_written(of, path));
+    let other = other.zip(terrain.account.reference.as_ref());
+    let (path, surface, heights_m) = match other {
+        Some((path, reference)) => {
+            let areoid = site.config.terms().areoid();
+            (path, areoid, reference.heights_m(grid))
         }
-        layers.push(Layer {
-            name: format!("Orthoimage {id}"),
-            source: source(&path),
-            wkt: equirectangular_wkt(site.config.body, orthoimage.account.parallel_rad),
-            is_shown: true,
-            form: Form::Brightness {
-                range: stretch(&orthoimage.brightness),
-            },
-        });
-    }
-    if let Some(terrain) = site.find::<Surface>()?.filter(|_| is_written(of, TERRAIN)) {
-        let grid = &terrain.model.heights;
-        let other = TERRAIN_ABOVE.into_iter().find(|path| is_written(of, path));
-        let other = other.zip(terrain.account.reference.as_ref());
-        let (path, surface, heights_m) = match other {
-            Some((path, reference)) => (path, terms.areoid(), reference.heights_m(grid)),
-            None => (TERRAIN, "map sphere", grid.heights_m.clone()),
+        None => (TERRAIN, "map sphere", grid.heights_m.clone()),
+    };
+    let known = heights_m.iter().filter(|height| height.is_finite());
+    let range = range(known.map(|height| f64::from(*height)));
+    let wkt = equirectangular_wkt(site.config.body, terrain.model.parallel_rad);
+    let layer = |name: String, form: Form| Layer {
+        name,
+        source: source(path),
+        wkt: wkt.clone(),
+        is_shown: true,
+        form,
+    };
+    Ok(vec![
+        layer(
+            format!("Terrain model, height above the {surface} in m"),
+            Form::Terrain { range },
+        ),
+        layer("Terrain model, shaded".to_owned(), Form::Shaded),
+    ])
+}
+
+/// The images of the mosaic, the mosaic, and the one before the adjustment.
+fn mosaics(of: &Context) -> Result<Vec<Layer>> {
+    let site = of.site;
+    let mut layers = Vec::new();
+    let mosaics = [
+        (site.book.find_best::<Option<Mosaic>>()?, ""),
+        (site.book.find_before::<Option<Mosaic>>()?, "_before"),
+    ];
+    for (mosaic, suffix) in mosaics {
+        let [brightness, sources] = ["", "_source"].map(|of| format!("mosaic{suffix}{of}.tif"));
+        let is_best = suffix.is_empty();
+        let mosaic = mosaic.and_then(Option::as_ref);
+        let Some(mosaic) = mosaic.filter(|_| is_written(of, &brightness)) else {
+            continue;
         };
-        let known = heights_m.iter().filter(|height| height.is_finite());
-        let range = range(known.map(|height| f64::from(*height)));
-        let heights = source(path);
-        let wkt = equirectangular_wkt(site.config.body, terrain.model.parallel_rad);
+        let wkt = equirectangular_wkt(site.config.body, mosaic.account.parallel_rad);
+        if is_best && is_written(of, &sources) {
+            let parts = mosaic.account.images.iter();
+            layers.push(Layer {
+                name: "Images of the mosaic".to_owned(),
+                source: source(&sources),
+                wkt: wkt.clone(),
+                is_shown: false,
+                form: Form::Sources {
+                    images: parts
+                        .map(|part| site.images[part.image].times.id.clone())
+                        .collect(),
+                },
+            });
+        }
+        let name = if is_best {
+            "Mosaic"
+        } else {
+            "Mosaic before the adjustment"
+        };
         layers.push(Layer {
-            name: format!("Terrain model, height above the {surface} in m"),
-            source: heights.clone(),
-            wkt: wkt.clone(),
-            is_shown: true,
-            form: Form::Terrain { range },
-        });
-        layers.push(Layer {
-            name: "Terrain model, shaded".to_owned(),
-            source: heights,
+            name: name.to_owned(),
+            source: source(&brightness),
             wkt,
-            is_shown: true,
-            form: Form::Shaded,
+            is_shown: is_best,
+            form: Form::Brightness {
+                range: stretch(&mosaic.brightness),
+            },
         });
     }
     Ok(layers)

@@ -10,13 +10,15 @@ use rusqlite::Connection;
 use super::{DatabaseError, Stored, copy};
 
 /// Layout of the tables; a change raises it and adds a step to [`migrate`].
-pub(super) const VERSION: i64 = 2;
+pub(super) const VERSION: i64 = 3;
 /// Tables by which a database of the service is recognized.
 const OWN_TABLES: &str = "SELECT count(*) FROM sqlite_schema WHERE type = 'table' AND name IN ('service', 'run', 'site', 'token')";
 /// Step from layout 1: time of the last reading of the products of a run, and number of them that do not match its
 /// manifest.
 const CHECKED_RUNS: &str = "ALTER TABLE run ADD COLUMN checked_ms INTEGER;
     ALTER TABLE run ADD COLUMN damaged INTEGER NOT NULL DEFAULT 0;";
+/// Step from layout 2: body of a site, which its next plan states.
+const BODIES: &str = "ALTER TABLE site ADD COLUMN body TEXT NOT NULL DEFAULT 'mars';";
 const SCHEMA: &str = include_str!("schema.sql");
 
 /// A free path in `folder` for a file that is moved aside or copied: `stem.db`, `stem_2.db` and so on.
@@ -68,8 +70,13 @@ pub(super) fn migrate(connection: &mut Connection, folder: &Path) -> Stored<()> 
     }
     let transaction = connection.transaction()?;
     match found {
-        Some(1) => transaction.execute_batch(CHECKED_RUNS)?,
-        _ => transaction.execute_batch(SCHEMA)?,
+        None => transaction.execute_batch(SCHEMA)?,
+        Some(layout) => {
+            let steps = [CHECKED_RUNS, BODIES].into_iter().zip(1..);
+            for (step, _) in steps.filter(|(_, from)| *from >= layout) {
+                transaction.execute_batch(step)?;
+            }
+        }
     }
     transaction.pragma_update(None, "user_version", VERSION)?;
     transaction.commit()?;
@@ -86,7 +93,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(DATABASE);
         drop(Database::open(folder.path()).unwrap());
-        let former = "ALTER TABLE run DROP COLUMN checked_ms; ALTER TABLE run DROP COLUMN damaged;
+        let former = "ALTER TABLE run DROP COLUMN checked_ms; ALTER TABLE run DROP COLUMN damaged; ALTER TABLE site DROP COLUMN body;
             INSERT INTO fact VALUES ('a', 'b'); PRAGMA user_version = 1";
         Connection::open(&path)
             .unwrap()
@@ -94,12 +101,13 @@ mod tests {
             .unwrap();
         // The copy of an earlier migration, after a return to the former layout.
         let copies =
-            ["before-layout-2.db", "before-layout-2_2.db"].map(|name| folder.path().join(name));
+            ["before-layout-3.db", "before-layout-3_2.db"].map(|name| folder.path().join(name));
         #[allow(clippy::disallowed_methods, reason = "an earlier copy for a test")]
         fs::write(&copies[0], "earlier").unwrap();
         let database = Database::open(folder.path()).unwrap();
         let found = database.read(|connection| {
             connection.prepare("SELECT checked_ms, damaged FROM run")?;
+            connection.prepare("SELECT body FROM site")?;
             let sql = "SELECT value FROM fact WHERE name = 'a'";
             Ok(connection.query_row(sql, [], |row| row.get::<_, String>(0))?)
         });
@@ -108,5 +116,27 @@ mod tests {
         let copy = Connection::open(&copies[1]).unwrap();
         let layout = copy.query_row("PRAGMA user_version", [], |row| row.get::<_, i64>(0));
         assert_eq!(layout.unwrap(), 1);
+    }
+
+    #[test]
+    fn a_site_of_layout_2_has_a_body() {
+        let folder = tempfile::tempdir().unwrap();
+        drop(Database::open(folder.path()).unwrap());
+        let former = "ALTER TABLE site DROP COLUMN body;
+            INSERT INTO site (name, file, config_blake3, enabled) VALUES ('a', 'a.toml', '', 1);
+            PRAGMA user_version = 2";
+        let path = folder.path().join(DATABASE);
+        Connection::open(&path)
+            .unwrap()
+            .execute_batch(former)
+            .unwrap();
+        let database = Database::open(folder.path()).unwrap();
+        let found = database.read(|connection| {
+            connection.prepare("SELECT checked_ms, damaged FROM run")?;
+            let sql = "SELECT body FROM site WHERE name = 'a'";
+            Ok(connection.query_row(sql, [], |row| row.get::<_, String>(0))?)
+        });
+        assert_eq!(found.unwrap(), "mars");
+        assert!(folder.path().join("before-layout-3.db").is_file());
     }
 }

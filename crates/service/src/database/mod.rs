@@ -346,7 +346,7 @@ mod tests {
             .unwrap();
         drop(connection);
         let refused = Database::open(folder.path()).unwrap_err().to_string();
-        assert!(refused.contains("has layout 3"), "{refused}");
+        assert!(refused.contains("has layout 4"), "{refused}");
         let mut bytes = fs::read(&path).unwrap();
         bytes[4096..8192].fill(0xff);
         #[allow(clippy::disallowed_methods, reason = "a damaged file for a test")]
@@ -386,7 +386,7 @@ mod tests {
             with("PRAGMA user_version = 0")(path);
         });
         assert_eq!(kind, Kind::Input, "{text}");
-        assert!(text.contains("its layout is 0; expected 1 to 2"), "{text}");
+        assert!(text.contains("its layout is 0; expected 1 to 3"), "{text}");
         let (kind, text) = refused(&|path| fs::create_dir(path).unwrap());
         assert_eq!(kind, Kind::Input, "{text}");
         assert!(text.contains("not a regular file"), "{text}");

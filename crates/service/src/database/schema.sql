@@ -35,7 +35,9 @@ CREATE TABLE site (
   last_note TEXT,
   -- The round in which all that it could read was last compared; 0: it is to be planned.
   round INTEGER NOT NULL DEFAULT 0,
-  west_deg REAL, south_deg REAL, east_deg REAL, north_deg REAL
+  west_deg REAL, south_deg REAL, east_deg REAL, north_deg REAL,
+  -- Of its windows, as its next plan states.
+  body TEXT NOT NULL DEFAULT 'mars'
 ) STRICT;
 
 -- Which files a site reads, from its plan and its last manifest.

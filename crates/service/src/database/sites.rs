@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use rusqlite::{Connection, OptionalExtension as _, Row, Transaction, params};
 
 use super::Stored;
+use areograph_base::body::Body;
 
 /// The round of a site that requires a plan because another program made its products.
 pub const OTHER_PROGRAM: i64 = -1;
@@ -112,6 +113,8 @@ pub struct Checked<'a> {
     pub config_blake3: Option<&'a str>,
     /// Extent of its windows, degrees, if it was planned.
     pub bounds_deg: Option<[f64; 4]>,
+    /// Its body, if it was planned.
+    pub body: Option<Body>,
     /// The reason for which it cannot be planned.
     pub problem: Option<&'a str>,
     /// As text.
@@ -128,7 +131,7 @@ pub fn put_checked(transaction: &Transaction<'_>, name: &str, checked: &Checked<
     transaction.execute(
         "UPDATE site SET round = ?2, checked_ms = ?3, config_blake3 = coalesce(?4, config_blake3), problem = ?5, last_note = ?6,
          west_deg = coalesce(?7, west_deg), south_deg = coalesce(?8, south_deg),
-         east_deg = coalesce(?9, east_deg), north_deg = coalesce(?10, north_deg) WHERE name = ?1",
+         east_deg = coalesce(?9, east_deg), north_deg = coalesce(?10, north_deg), body = coalesce(?11, body) WHERE name = ?1",
         params![
             name,
             checked.round,
@@ -140,6 +143,7 @@ pub fn put_checked(transaction: &Transaction<'_>, name: &str, checked: &Checked<
             bound(1),
             bound(2),
             bound(3),
+            checked.body.map(Body::word),
         ],
     )?;
     Ok(())

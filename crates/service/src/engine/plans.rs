@@ -244,6 +244,7 @@ impl Context<'_> {
             at_ms: self.now_ms,
             config_blake3: answer.map(|answer| &*answer.config_blake3),
             bounds_deg: answer.and_then(|answer| answer.bounds_deg),
+            body: answer.map(|answer| answer.body),
             problem,
             note,
         };

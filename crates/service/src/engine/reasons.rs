@@ -105,6 +105,7 @@ fn several(names: &[&str]) -> String {
 mod tests {
     use super::*;
     use crate::database::CauseKind;
+    use areograph_base::body::Body;
 
     fn answer(stages: &[(&str, bool, &str)]) -> PlanAnswer {
         let stage = |(stage, runs, because): &(&str, bool, &str)| PlannedStage {
@@ -117,6 +118,7 @@ mod tests {
             stages: stages.iter().map(stage).collect(),
             files: Vec::new(),
             bounds_deg: None,
+            body: Body::Mars,
         }
     }
 

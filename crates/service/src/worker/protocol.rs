@@ -9,6 +9,7 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use areograph_base::body::Body;
 use areograph_store::files::Identity;
 
 /// Version of these lines.
@@ -243,6 +244,8 @@ pub struct PlanAnswer {
     pub files: Vec<PlannedFile>,
     /// Extent of the site's windows: west, south, east, north, degrees; `None` for a site without windows.
     pub bounds_deg: Option<[f64; 4]>,
+    /// The body of the site.
+    pub body: Body,
 }
 
 /// A stage with the reason why it runs.

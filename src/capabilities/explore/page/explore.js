@@ -29,6 +29,7 @@ function shotValues(row) {
     [`height above the ${values.areoid}`, `${shots.topography_m.text(row)} m`],
     [`height above the sphere of ${values.sphere_m / 1000} km`, `${above} m`],
   ];
+  if (previous[row] >= 0) list.push(['distance from the previous footprint', `${apartM(previous[row], row).toFixed(0)} m`]);
   for (const of of registered) {
     const at = of.rowByShot.get(row);
     if (at === undefined) continue;
@@ -93,7 +94,7 @@ byId('ramp').style.background = `linear-gradient(to right,${colours.join()})`;
 byId('ramp-low').textContent = `${withMinus(heights.low.toFixed(0))} m`;
 byId('ramp-high').textContent = `${withMinus(heights.high.toFixed(0))} m above the ${values.areoid}; ${
   shots.count < shots.of ? `${shots.count} of ${plural(shots.of, 'footprint')}` : plural(shots.count, 'footprint')}`;
-for (const [id, colour] of [['before', mapBefore], ['after', mapAfter], ['curve', '#ffe14d'], ['measured', '#c84a96'], ['outlines', '#c84a96'], ['ties', '#222']]) {
+for (const [id, colour] of [['before', mapBefore], ['after', mapAfter], ['curve', '#ffe14d'], ['measured', '#c84a96'], ['outlines', '#c84a96'], ['windows', '#222'], ['ties', '#222']]) {
   const mark = byId(id)?.parentElement.querySelector('.swatch');
   if (mark) mark.style.background = colour;
 }

@@ -58,10 +58,11 @@ function makeMap(choose) {
   byId('relief').addEventListener('change', (event) => (event.target.checked ? ground.addTo(map) : ground.remove()));
 
   // What is drawn on them.
-  const toggles = Object.fromEntries(['footprints', 'outlines', 'ties', 'residuals'].map((id) => [id, byId(id)]));
+  const toggles = Object.fromEntries(['footprints', 'outlines', 'windows', 'ties', 'residuals'].map((id) => [id, byId(id) ?? { checked: false }]));
   const state = { shot: -1, tie: -1 };
   const arrows = arrowsOf();
   const drawing = new Drawing((of) => {
+    if (toggles.windows.checked) drawWindows(of);
     if (toggles.outlines.checked) drawOutlines(of);
     if (toggles.footprints.checked) drawFootprints(of);
     if (toggles.ties.checked) drawTies(of);
@@ -71,7 +72,7 @@ function makeMap(choose) {
     if (state.tie >= 0) ring(context, x(ties.x[state.tie]), y(ties.y[state.tie]), 8, '#c10019');
   });
   for (const toggle of Object.values(toggles)) {
-    toggle.addEventListener('change', () => { drawing.soon(); words(); });
+    toggle.addEventListener?.('change', () => { drawing.soon(); words(); });
   }
 
   // The images of the arrows, and their magnification.
@@ -155,6 +156,27 @@ function drawOutlines({ context, x, y }) {
     // The images of a pair begin and end together.
     if (index % 2) label(context, id, x(low[0]) + 4, y(low[1]) + 16);
     else label(context, id, x(top[0]) + 4, y(top[1]) - 6);
+  }
+}
+
+// Search windows, dashed.
+function drawWindows({ context, x, y }) {
+  for (const { id, ring_deg: ring } of values.windows) {
+    const places = ring.map((corner) => placeOf(...corner));
+    for (const [width, colour, dash] of [[4, '#fff', []], [2, '#222', [8, 5]]]) {
+      context.lineWidth = width;
+      context.strokeStyle = colour;
+      context.setLineDash(dash);
+      context.beginPath();
+      for (const [east, north] of places) context.lineTo(x(east), y(north));
+      context.closePath();
+      context.stroke();
+    }
+    context.setLineDash([]);
+    const low = places.reduce((best, place) => (place[1] - place[0] < best[1] - best[0] ? place : best));
+    context.textAlign = 'right';
+    label(context, id, x(low[0]) - 4, y(low[1]) - 6);
+    context.textAlign = 'left';
   }
 }
 

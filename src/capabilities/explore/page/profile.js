@@ -126,9 +126,17 @@ function makeGraph(choose, onProfile) {
   addEventListener('resize', soon);
 
   if (withFootprints.length) {
-    const longest = withFootprints.reduce((best, of) => (of.rows.length > best.rows.length ? of : best));
-    const onTerrain = withFootprints.find(({ profile }) => terrain.some((line) => line.profile === profile));
-    view((onTerrain ?? longest).profile);
+    // A profile on the terrain model where there is one, with the most footprints in the first image; the longest of these.
+    const [image] = registered;
+    const inImage = new Map();
+    image?.footprint.numbers.forEach((shot, at) => {
+      const profile = shots.profile.numbers[shot];
+      if (image.inside.numbers[at]) inImage.set(profile, (inImage.get(profile) ?? 0) + 1);
+    });
+    const onTerrain = withFootprints.filter(({ profile }) => terrain.some((line) => line.profile === profile));
+    const worth = ({ rows, profile }) => 1e6 * (inImage.get(profile) ?? 0) + rows.length;
+    const first = (onTerrain.length ? onTerrain : withFootprints).reduce((best, of) => (worth(of) > worth(best) ? of : best));
+    view(first.profile);
   } else byId('profile-words').textContent = 'The site has no footprints.';
   return {
     show({ shot = -1, tie = -1 }, isRemote) {

@@ -10,7 +10,7 @@ function makeStrip(choose) {
   const select = byId('image');
   const map = evenMap('strip', { maxZoom: 4 });
   const tip = tipIn(map.getContainer().parentElement);
-  const toggles = Object.fromEntries(['before', 'after', 'curve', 'measured'].map((id) => [id, byId(id)]));
+  const toggles = Object.fromEntries(['before', 'after', 'curve', 'distances', 'measured'].map((id) => [id, byId(id)]));
   const state = { shot: -1, tie: -1 };
   let shown = null;
   let picture = null;
@@ -20,9 +20,10 @@ function makeStrip(choose) {
   const drawing = new Drawing((of) => {
     if (!shown) return;
     drawFrame(of, shown);
+    if (toggles.before.checked) drawPlaces(of, shown, shown.before, mapBefore);
+    if (toggles.after?.checked) drawPlaces(of, shown, shown.after, mapAfter);
     if (toggles.curve.checked) drawCurves(of, shown);
-    if (toggles.before.checked) drawPlaces(of, shown.before, mapBefore);
-    if (toggles.after?.checked) drawPlaces(of, shown.after, mapAfter);
+    if (toggles.distances.checked) drawDistances(of, shown);
     if (toggles.measured.checked) drawMeasures(of, shown);
     const { context, x, y } = of;
     const at = shown.rowOf.get(state.shot);
@@ -148,12 +149,15 @@ function curvesOf(of, latest, samples) {
     const away = (mean > samples / 2 ? -1 : 1) * curveShare * samples;
     const points = rows.map((row) => ({
       instant: Number(shots.instants[shotOf(row)]) / 1e6,
+      shot: shotOf(row),
       track: [latest.sample[row], -latest.line[row]],
       curve: [latest.sample[row] + (away * (ground(row) - low)) / Math.max(high - low, 0.01), -latest.line[row]],
     }));
     return { profile, points };
   });
-  return { low, high, curves };
+  const apart = curves.flatMap(({ points }) => points.slice(1).map(({ track }, at) => Math.abs(track[1] - points[at].track[1])));
+  apart.sort((one, other) => one - other);
+  return { low, high, curves, spacing: apart[apart.length >> 1] ?? Infinity };
 }
 
 function drawFrame({ context, x, y, scale }, { lines, samples }) {
@@ -171,8 +175,9 @@ function drawFrame({ context, x, y, scale }, { lines, samples }) {
   context.fillText('line', Math.max(x(0), 4) + 2, Math.max(y(0) - 6, 12));
 }
 
-function drawPlaces({ context, x, y, scale, view }, { x: samples, y: lines }, colour) {
-  const radius = Math.min(9, Math.max(2.5, scale * 8));
+// Rings that leave the image between footprints in sight.
+function drawPlaces({ context, x, y, scale, view }, { elevation: { spacing } }, { x: samples, y: lines }, colour) {
+  const radius = Math.min(9, Math.max(1.5, scale * Math.min(8, spacing / 3)));
   for (const [width, stroke] of [[3.5, '#fff'], [1.75, colour]]) {
     context.lineWidth = width;
     context.strokeStyle = stroke;
@@ -186,9 +191,11 @@ function drawPlaces({ context, x, y, scale, view }, { x: samples, y: lines }, co
   }
 }
 
+const isDrawn = (profile, curves) => curves.length <= curvesDrawn || profile === current.profile;
+
 function drawCurves({ context, x, y }, { elevation: { curves } }) {
   for (const { profile, points } of curves) {
-    if (curves.length > curvesDrawn && profile !== current.profile) continue;
+    if (!isDrawn(profile, curves)) continue;
     for (const [width, colour, name] of [[1, '#fff', 'track'], [5, '#000', 'curve'], [2.5, '#ffe14d', 'curve']]) {
       context.lineWidth = width;
       context.strokeStyle = colour;
@@ -201,6 +208,22 @@ function drawCurves({ context, x, y }, { elevation: { curves } }) {
         last = point.instant;
       }
       context.stroke();
+    }
+  }
+}
+
+// Distances between successive footprints, where there is room for them.
+function drawDistances({ context, x, y, size }, { elevation: { curves } }) {
+  for (const { profile, points } of curves) {
+    if (!isDrawn(profile, curves)) continue;
+    for (let at = 1; at < points.length; at += 1) {
+      const [from, to] = [points[at - 1], points[at]];
+      const [fromY, toY] = [y(from.track[1]), y(to.track[1])];
+      const middle = (fromY + toY) / 2;
+      // A footprint between them may lie outside the image, or have no place among those of the page.
+      if (previous[to.shot] !== from.shot || Math.abs(toY - fromY) < 18 || middle < 0 || middle > size.y) continue;
+      const right = Math.max(x(from.track[0]), x(to.track[0]));
+      label(context, `${apartM(from.shot, to.shot).toFixed(0)} m`, right + 12, middle + 4);
     }
   }
 }

@@ -146,6 +146,19 @@ ties.nearest = new Nearest(ties.x, ties.y);
 const profileRows = values.profiles.map(() => []);
 for (let row = 0; row < shots.count; row += 1) profileRows[shots.profile.numbers[row]]?.push(row);
 
+// The footprint before each one in its profile, or −1, and the distance from it, metres.
+const previous = new Int32Array(shots.count).fill(-1);
+for (const rows of profileRows) rows.forEach((row, at) => { if (at) previous[row] = rows[at - 1]; });
+function pointOf(row) {
+  const [longitude, latitude] = [shots.longitude_deg.at(row) * degree, shots.latitude_deg.at(row) * degree];
+  const radius = shots.ground_radius_m.at(row);
+  return [Math.cos(latitude) * Math.cos(longitude), Math.cos(latitude) * Math.sin(longitude), Math.sin(latitude)].map((part) => radius * part);
+}
+function apartM(from, to) {
+  const [one, other] = [pointOf(from), pointOf(to)];
+  return Math.hypot(...one.map((part, axis) => part - other[axis]));
+}
+
 // Colours of heights in steps; the ends leave out one footprint in fifty on either side.
 const colourSteps = 48;
 const heights = (() => {

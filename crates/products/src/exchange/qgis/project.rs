@@ -15,6 +15,16 @@ const COLOURS: [&str; 5] = [
     "94,201,98,255",
     "253,231,37,255",
 ];
+/// Colours of images: a qualitative scale for any colour vision (Okabe and Ito 2008).
+const SOURCES: [&str; 7] = [
+    "230,159,0,255",
+    "86,180,233,255",
+    "0,158,115,255",
+    "240,228,66,255",
+    "0,114,178,255",
+    "213,94,0,255",
+    "204,121,167,255",
+];
 /// Beginning of the identifiers of layers; QGIS replaces those of up to ten letters.
 const ID: &str = "areograph_layer_";
 /// Colour of contours.
@@ -52,6 +62,8 @@ pub(super) enum Form {
     Contours { label: &'static str },
     /// Brightness in this range.
     Brightness { range: [u8; 2] },
+    /// Numbers of images, from 1 on, as colours under their names.
+    Sources { images: Vec<String> },
     /// Heights in colours, multiplied with the layer below.
     Terrain { range: [f64; 2] },
     /// Heights under light from the north-west.
@@ -65,7 +77,10 @@ impl Form {
             Self::Points | Self::Heights { .. } | Self::Arrows { .. } => Some("Point"),
             Self::Contours { .. } => Some("Line"),
             Self::Outlines { .. } => Some("Polygon"),
-            Self::Brightness { .. } | Self::Terrain { .. } | Self::Shaded => None,
+            Self::Brightness { .. }
+            | Self::Sources { .. }
+            | Self::Terrain { .. }
+            | Self::Shaded => None,
         }
     }
 
@@ -316,6 +331,16 @@ fn raster_style(form: &Form) -> Markup {
                     minValue { (black) }
                     maxValue { (white) }
                     algorithm { "StretchToMinimumMaximum" }
+                }
+            }
+        },
+        Form::Sources { images } => html! {
+            rasterrenderer type="paletted" band="1" opacity="1" alphaBand="-1" {
+                colorPalette {
+                    @for (index, image) in images.iter().enumerate() {
+                        @let colour = SOURCES[index % SOURCES.len()];
+                        paletteEntry value=(index + 1) color=(hexadecimal(colour)) alpha="255" label=(image) {}
+                    }
                 }
             }
         },

@@ -6,6 +6,8 @@ use rusqlite::{Connection, OptionalExtension as _, Row, params};
 use serde::Serialize;
 use utoipa::ToSchema;
 
+use areograph_base::body::Body;
+
 use crate::{
     database::{Stored, waits::waits},
     instant::Instant,
@@ -49,6 +51,9 @@ pub struct Site {
     pub waits_for: Option<String>,
     /// Extent of its windows: west, south, east, north, degrees of east longitude and areocentric latitude.
     pub bounds_deg: Option<[f64; 4]>,
+    /// The body of its windows.
+    #[schema(value_type = String, example = "mars")]
+    pub body: Body,
 }
 
 const SELECT: &str = "
@@ -128,6 +133,8 @@ fn read(row: &Row<'_>) -> rusqlite::Result<Site> {
         [Some(west), Some(south), Some(east), Some(north)] => Some([west, south, east, north]),
         _ => None,
     };
+    let word: String = row.get("body")?;
+    let body = Body::WORDS.into_iter().find(|(of, _)| *of == word);
     let since: Option<Instant> = row.get("current_since_ms")?;
     Ok(Site {
         name: row.get("name")?,
@@ -147,6 +154,7 @@ fn read(row: &Row<'_>) -> rusqlite::Result<Site> {
         job_state: state.and_then(|state| state.parse().ok()),
         waits_for: None,
         bounds_deg,
+        body: body.map_or_else(Body::default, |(_, body)| body),
     })
 }
 

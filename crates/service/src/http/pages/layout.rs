@@ -14,6 +14,8 @@ use crate::http::{app::App, caller::Caller, problem::Problem};
 pub(super) const STYLE_PATH: &str = concat!("/style-", env!("CARGO_PKG_VERSION"), ".css");
 /// Address of the script.
 pub(super) const SCRIPT_PATH: &str = concat!("/script-", env!("CARGO_PKG_VERSION"), ".js");
+/// Address of the ground of Mars for maps.
+pub(super) const RELIEF_PATH: &str = concat!("/mars-", env!("CARGO_PKG_VERSION"), ".png");
 /// Keeps pages up to date.
 pub(super) const SCRIPT: &str = include_str!("live.js");
 

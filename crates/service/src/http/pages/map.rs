@@ -1,8 +1,10 @@
-//! Map of the sites: Mars from 0° to 360° E, equidistant cylindrical.
+//! Maps of the sites, one of each body: from 0° to 360° E, equidistant cylindrical, Mars over its relief.
 
 use maud::{Markup, html};
 
-use super::parts::tone;
+use super::{layout::RELIEF_PATH, parts::tone};
+use areograph_base::body::Body;
+
 use crate::{database::shown::Site, words::counted};
 
 /// Units of the picture per degree.
@@ -19,30 +21,49 @@ const NAMES: usize = 30;
 const LETTER: f64 = 9.0;
 const LINE: f64 = 18.0;
 
-/// The map, and its description.
-pub(super) fn map(sites: &[Site]) -> Markup {
-    let placed: Vec<(&Site, [f64; 4])> = sites
-        .iter()
-        .filter_map(|site| Some((site, site.bounds_deg?)))
-        .collect();
+/// A map of each body with sites, that of Mars even without any.
+pub(super) fn maps(sites: &[Site]) -> Markup {
+    let placed = |body: Body| -> Vec<(&Site, [f64; 4])> {
+        let on_it = sites.iter().filter(|site| site.body == body);
+        on_it
+            .filter_map(|site| Some((site, site.bounds_deg?)))
+            .collect()
+    };
+    let others = sites.iter().filter(|site| site.bounds_deg.is_none());
+    let has_others = others.count() > 0;
+    html! {
+        @for (_, body) in Body::WORDS {
+            @let placed = placed(body);
+            @if body == Body::Mars || !placed.is_empty() { (map(body, &placed)) }
+        }
+        @if has_others { p { "The windows of the other sites are not known yet." } }
+    }
+}
+
+/// The map of a body, and its description.
+fn map(body: Body, placed: &[(&Site, [f64; 4])]) -> Markup {
     let (width, height) = (360.0 * SCALE, 180.0 * SCALE);
-    let names = names(&placed, width);
+    let names = names(placed, width);
     html! {
         figure class="map" {
-            svg viewBox={ "0 0 " (LEFT + width + RIGHT) " " (TOP + height + 28.0) } role="group" aria-label="Map of the sites" {
+            svg viewBox={ "0 0 " (LEFT + width + RIGHT) " " (TOP + height + 28.0) } role="group" aria-label={ "Map of the sites on " (body) } {
+                // The picture has the layout of the map.
+                @if body.relief().is_some() {
+                    image href=(RELIEF_PATH) x=(LEFT) y=(TOP) width=(width) height=(height) preserveAspectRatio="none" {}
+                }
                 @for k in 0..=12_u32 {
                     @let longitude = f64::from(30 * k);
                     @let x = LEFT + longitude * SCALE;
-                    line x1=(x) y1=(TOP) x2=(x) y2=(TOP + height) stroke="#E2E2E2" {}
+                    line x1=(x) y1=(TOP) x2=(x) y2=(TOP + height) stroke="#E2E2E2" stroke-opacity="0.5" {}
                     @if k % 2 == 0 { text x=(x) y=(TOP + height + 22.0) text-anchor="middle" font-size="17" fill="#222222" { (longitude) "°" } }
                 }
                 @for k in 0..=6_u32 {
                     @let latitude = 90.0 - f64::from(30 * k);
                     @let y = TOP + (90.0 - latitude) * SCALE;
-                    line x1=(LEFT) y1=(y) x2=(LEFT + width) y2=(y) stroke="#E2E2E2" {}
+                    line x1=(LEFT) y1=(y) x2=(LEFT + width) y2=(y) stroke="#E2E2E2" stroke-opacity="0.5" {}
                     text x=(LEFT - 6.0) y=(y + 6.0) text-anchor="end" font-size="17" fill="#222222" { (latitude_name(latitude)) }
                 }
-                @for (site, bounds_deg) in &placed {
+                @for (site, bounds_deg) in placed {
                     @let waits = site.waits_for.is_some();
                     a href={ "/sites/" (site.name) }
                         aria-label={ (site.name) ": " (site.verdict.as_deref().unwrap_or("no run yet")) @if waits { ", waits" } } {
@@ -56,9 +77,9 @@ pub(super) fn map(sites: &[Site]) -> Markup {
                 }
             }
             figcaption {
-                (counted(placed.len(), "site")) " with windows; east longitude and areocentric latitude. The colour shows the verdict."
+                (counted(placed.len(), "site")) " with windows on " (body) "; east longitude and areocentric latitude. The colour shows the verdict."
                 @if placed.iter().any(|(site, _)| site.waits_for.is_some()) { " A site with a dashed frame waits for an input." }
-                @if sites.len() > placed.len() { " The windows of the other sites are not known yet." }
+                @if body.relief().is_some() { " Ground: MOLA heights, shaded (MEGDR, NASA PDS)." }
             }
         }
     }
@@ -152,6 +173,23 @@ mod tests {
             assert!((part[2] - 20.0).abs() < 1e-9);
         }
         assert_eq!(rectangles([355.0, 0.0, 360.0, 1.0]).len(), 1);
+    }
+
+    #[test]
+    fn sites_of_each_body_have_their_own_map() {
+        let site = |name: &str, body: Body| Site {
+            name: name.to_owned(),
+            bounds_deg: Some([10.0, 0.0, 11.0, 1.0]),
+            body,
+            ..Site::default()
+        };
+        let both = [site("gusev", Body::Mars), site("tycho", Body::Moon)];
+        let page = maps(&both).0;
+        let (mars, moon) = page.split_once("</figure>").unwrap();
+        assert!(mars.contains("/sites/gusev") && !mars.contains("/sites/tycho"));
+        assert!(mars.contains("<image ") && mars.contains("MEGDR"));
+        assert!(moon.contains("/sites/tycho") && !moon.contains("<image "));
+        assert_eq!(maps(&both[..1]).0.matches("<figure").count(), 1);
     }
 
     #[test]

@@ -19,6 +19,7 @@ mod trend;
 
 use std::sync::Arc;
 
+use areograph_base::body::Body;
 use axum::{
     Router,
     http::{HeaderName, header},
@@ -37,6 +38,7 @@ pub(super) fn routes() -> Router<Arc<App>> {
         (header::CONTENT_TYPE, "text/javascript; charset=utf-8"),
         KEPT,
     ];
+    let relief = [(header::CONTENT_TYPE, "image/png"), KEPT];
     Router::new()
         .route("/", get(sites::home))
         .route("/sites/{site}", get(sites::one))
@@ -61,5 +63,9 @@ pub(super) fn routes() -> Router<Arc<App>> {
         .route(
             layout::SCRIPT_PATH,
             get(move || async move { (script, layout::SCRIPT) }),
+        )
+        .route(
+            layout::RELIEF_PATH,
+            get(move || async move { (relief, Body::Mars.relief().unwrap_or_default()) }),
         )
 }

@@ -13,7 +13,7 @@ use serde::Deserialize;
 use super::{
     data::last_scrub,
     layout::{Page, form_token, operator},
-    map::map,
+    map::maps,
     parts::{
         Times, figure, figure_name, lead, more, prose, said, state, table, times, tone, verdict,
     },
@@ -100,7 +100,7 @@ pub(super) async fn home(
         div id="state" data-live="" { (standing(shown, &faults, &times)) }
         section {
             h2 { "Map" }
-            div id="map" data-live="" { (map(shown)) }
+            div id="map" data-live="" { (maps(shown)) }
         }
         section {
             h2 { "Sites" }

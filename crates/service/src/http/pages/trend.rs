@@ -138,9 +138,9 @@ fn plot(name: &str, runs: &[&Run], values: &[Option<f64>], steps: &[Option<Strin
     };
     let low = known.iter().copied().fold(f64::INFINITY, f64::min);
     let high = known.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    // A constant figure is a line in the middle.
+    // A constant figure is a line in the middle, and small changes of a figure look small.
     let margin = (0.08 * (high - low))
-        .max(1e-3 * high.abs())
+        .max(0.05 * high.abs().max(low.abs()))
         .max(f64::MIN_POSITIVE);
     let (floor, ceiling) = (low - margin, high + margin);
     let x = |k: usize| LEFT + (k as f64 + 0.5) / runs.len() as f64 * (WIDTH - LEFT - RIGHT);
@@ -160,10 +160,9 @@ fn plot(name: &str, runs: &[&Run], values: &[Option<f64>], steps: &[Option<Strin
             h3 { (title) }
             svg viewBox={ "0 0 " (WIDTH) " " (HEIGHT) } role="img" aria-label={ (title) ", from " (figure(*first)) " to " (figure(*last)) } {
                 rect x=(LEFT) y=(TOP) width=(WIDTH - LEFT - RIGHT) height=(HEIGHT - TOP - BOTTOM) fill="none" stroke="#E2E2E2" {}
-                @for value in [high, low] {
-                    @if (value - low).abs() > 0.0 || high - low <= 0.0 || value <= low {
-                        text x=(LEFT - 6.0) y=(format!("{:.1}", y(value) + 5.0)) text-anchor="end" font-size="15" fill="#222222" { (figure(value)) }
-                    }
+                // The ends of the axis: they are always apart.
+                @for (value, down) in [(ceiling, TOP + 12.0), (floor, HEIGHT - BOTTOM)] {
+                    text x=(LEFT - 6.0) y=(down) text-anchor="end" font-size="15" fill="#222222" { (figure(value)) }
                 }
                 @for (k, step) in steps.iter().enumerate() {
                     @if let Some(words) = step {
@@ -184,8 +183,9 @@ fn plot(name: &str, runs: &[&Run], values: &[Option<f64>], steps: &[Option<Strin
                         }
                     }
                 }
-                text x=(LEFT) y=(HEIGHT - 8.0) font-size="15" fill="#222222" { (day(runs.first())) }
-                text x=(WIDTH - RIGHT) y=(HEIGHT - 8.0) text-anchor="end" font-size="15" fill="#222222" { (day(runs.last())) }
+                @let [from, to] = ends(runs);
+                text x=(LEFT) y=(HEIGHT - 8.0) font-size="15" fill="#222222" { (from) }
+                text x=(WIDTH - RIGHT) y=(HEIGHT - 8.0) text-anchor="end" font-size="15" fill="#222222" { (to) }
             }
             figcaption {
                 "From " (figure(*first)) " to " (figure(*last)) " over " (counted(points.len(), "run")) "."
@@ -196,7 +196,57 @@ fn plot(name: &str, runs: &[&Run], values: &[Option<f64>], steps: &[Option<Strin
     }
 }
 
-fn day(run: Option<&&Run>) -> String {
-    let text = run.map(|run| utc_text(run.published_utc.0));
-    text.unwrap_or_default().chars().take(10).collect()
+/// Days of the first and of the last run; with minutes if both are of one day.
+fn ends(runs: &[&Run]) -> [String; 2] {
+    let texts = [runs.first(), runs.last()]
+        .map(|run| run.map_or_else(String::new, |run| utc_text(run.published_utc.0)));
+    let part = |text: &str, letters: usize| text.chars().take(letters).collect::<String>();
+    let [from, to] = texts.each_ref().map(|text| part(text, 10));
+    if from == to {
+        texts.map(|text| part(&text, 16).replace('T', " "))
+    } else {
+        [from, to]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::instant::Instant;
+
+    fn run(published_ms: i64) -> Run {
+        Run {
+            published_utc: Instant(published_ms),
+            ..Run::default()
+        }
+    }
+
+    #[test]
+    fn ends_of_an_axis_are_apart_and_runs_of_one_day_have_minutes() {
+        let day_ms = 86_400_000;
+        let runs = [run(60_000), run(3_600_000), run(2 * day_ms)];
+        let all: Vec<&Run> = runs.iter().collect();
+        assert_eq!(
+            ends(&all[..2]),
+            ["1970-01-01 00:01", "1970-01-01 01:00"].map(str::to_owned)
+        );
+        assert_eq!(ends(&all), ["1970-01-01", "1970-01-03"].map(str::to_owned));
+        // A constant figure, and one that changes in the fourth digit.
+        for values in [[0.6758, 0.6758], [1.63e-3, 1.6302e-3], [-6.0, -6.0]] {
+            let plot = plot("range_mean_m", &all[..2], &values.map(Some), &[None, None]).0;
+            let labels = plot.split("text-anchor=\"end\" font-size=\"15\" fill=\"#222222\">");
+            let labels: Vec<&str> = labels
+                .skip(1)
+                .map(|part| part.split('<').next().unwrap())
+                .collect();
+            assert_ne!(labels[0], labels[1], "{labels:?}");
+            // The line is in the middle of the figure: no small change fills it.
+            let lines = plot.split("points=\"").nth(1).unwrap();
+            for point in lines.split('"').next().unwrap().split(' ') {
+                let down: f64 = point.split(',').nth(1).unwrap().parse().unwrap();
+                let middle = f64::midpoint(TOP, HEIGHT - BOTTOM);
+                assert!((down - middle).abs() < 0.05 * HEIGHT, "{down}");
+            }
+        }
+    }
 }

@@ -8,6 +8,7 @@ use std::{
     time::Duration,
 };
 
+use areograph_base::body::Body;
 use areograph_service::{
     engine::workers::Workers,
     worker::{
@@ -212,6 +213,7 @@ impl Played {
             }],
             files: files.collect(),
             bounds_deg: None,
+            body: Body::Mars,
         }))
     }
 
