@@ -63,6 +63,48 @@ fn known_shifts_are_found_between_cells() {
     }
 }
 
+/// Offsets that drift along the image, between small cells: coarse cells lead to the same offsets as one window.
+#[test]
+fn coarse_cells_lead_to_the_offsets_of_one_window() {
+    let waves = waves();
+    let size = [620, 520];
+    let drift = |row: f64| [0.06 * row - 60.3, 40.6 - 0.04 * row];
+    let mut one = orthoimage(0, [0, 0], size, |cell| {
+        ground(&waves, cell.map(|at| at as f64))
+    });
+    let other = orthoimage(1, [0, 0], size, |cell| {
+        let [row, column] = cell.map(|at| at as f64);
+        let [down, across] = drift(row);
+        ground(&waves, [row - down, column - across])
+    });
+    // Cells of half a metre: errors of a kilometre are 63 reduced cells of 32.
+    one.account.cell_m = 0.5;
+    let [first, second] = [&one, &other].map(|of| Raster::of(&of.account.map, &of.brightness));
+    let shift = shift(&first, &second, 0.5).unwrap();
+    let reach = ROOM + shift.factor;
+    assert_eq!(reach, 75);
+    let levels = Levels::of([&first, &second], reach);
+    let pair = Pair {
+        account: &one.account,
+        one: first,
+        other: second,
+    };
+    let (mut led, mut matching) = (0, 0);
+    for middle in middles(&pair.one) {
+        let Some(found) = pair.found(middle, &shift, &levels) else {
+            continue;
+        };
+        let template = pair.one.square(middle.map(|at| at - i64::from(HALF)), EDGE);
+        let of_window = pair.matched(&template.unwrap(), middle, shift.by, reach);
+        led += i32::from(levels.near(middle, shift.by, reach).is_some());
+        matching += i32::from(of_window.is_some());
+        // Both begin at the same whole cell.
+        assert_eq!(found, of_window);
+    }
+    println!("{led} of {matching} places led by coarse cells");
+    assert!(matching >= 30 && led * 10 >= matching * 9);
+}
+
 #[test]
 fn other_ground_does_not_match() {
     let waves: Vec<[f64; 4]> = waves()
