@@ -30,7 +30,7 @@ use crate::{
 };
 
 /// Raised when the layout of products changes.
-const METHOD: u32 = 42;
+const METHOD: u32 = 43;
 
 /// The products of a site.
 pub(super) struct SitePublication<'a> {
