@@ -68,7 +68,7 @@ fn known_shifts_are_found_between_cells() {
 fn coarse_cells_lead_to_the_offsets_of_one_window() {
     let waves = waves();
     let size = [620, 520];
-    let drift = |row: f64| [0.06 * row - 60.3, 40.6 - 0.04 * row];
+    let drift = |row: f64| [0.012 * row - 60.3, 40.6 - 0.008 * row];
     let mut one = orthoimage(0, [0, 0], size, |cell| {
         ground(&waves, cell.map(|at| at as f64))
     });

@@ -373,7 +373,7 @@ fn matched_ties_are_within_what_they_state_and_adjust_as_well_as_given_ones() {
         );
         assert!(given.join("report/overlays.html").exists());
         if is_long {
-            let written = mission.folder.join(format!("sites/{}.toml", site.id));
+            let written = mission.matched_site(site.id);
             let mapped = run(&mission.mapped_site(&written, site.id, 60.0), folder.path());
             if site.id == "gusev_crater" {
                 surface::Published::of(&mapped).hold_against(&mission.terrain);

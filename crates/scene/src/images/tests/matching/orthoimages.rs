@@ -28,8 +28,8 @@ use areograph_geom::{
 /// Half the edge of a compared square, and the largest shift, cells.
 const HALF: i64 = 12;
 const REACH: i64 = 8;
-/// Largest error of a place, cells.
-const FAR: i64 = 70;
+/// Largest error of a place, cells: those of kernels reach 90.
+const FAR: i64 = 110;
 /// Distance of compared squares, cells.
 const APART: usize = 150;
 
@@ -231,10 +231,9 @@ pub(super) struct Apart {
     pub(super) pixel_m: f64,
     /// Median before the adjustment, stated and true.
     pub(super) before_m: [Vector2<f64>; 2],
-    /// Root mean square after it.
+    /// Root mean square after it, and the stated jitter of both orthoimages.
     pub(super) after_m: f64,
-    /// Median after it, stated and true.
-    pub(super) medians_after_m: [Vector2<f64>; 2],
+    pub(super) jitter_m: f64,
 }
 
 impl Apart {
@@ -242,34 +241,35 @@ impl Apart {
         let document = fs::read(products.join("orthoimages.json")).unwrap();
         let document: serde_json::Value = serde_json::from_slice(&document).unwrap();
         let number = |place: &str| document.pointer(place).unwrap().as_f64().unwrap();
-        let mean_m = |place: &str, file: &str| {
+        let mean_m = |place: &str| {
             let id = document.pointer(place).unwrap().as_str().unwrap();
-            let errors_m = errors_m(mission, id, &Published::of(products, id, file));
-            println!("{id} {file}: {} places", errors_m.len());
+            let before = Published::of(products, id, "orthoimage_before.tif");
+            let errors_m = errors_m(mission, id, &before);
+            assert!(errors_m.len() >= 30);
             errors_m.iter().sum::<Vector2<f64>>() / errors_m.len() as f64
         };
-        let both = |file: &str, state: &str| {
-            let stated =
-                Vector2::from_fn(|axis, _| number(&format!("/pairs/0/{state}/median_m/{axis}")));
-            let [one, other] = [0, 1].map(|of| mean_m(&format!("/pairs/0/images/{of}"), file));
-            [stated, other - one]
-        };
-        println!("{:#}", document["pairs"][0]);
+        let stated_m = Vector2::from_fn(|axis, _| number(&format!("/pairs/0/before/median_m/{axis}")));
+        let [one_m, other_m] = [0, 1].map(|of| mean_m(&format!("/pairs/0/images/{of}")));
+        let jitter_m = document["orthoimages"].as_array().unwrap().iter();
+        // Omitted where no scatter was measured.
+        let jitter_m = jitter_m.filter_map(|of| of.get("jitter_m")?.as_f64());
         Self {
             pixel_m: number("/orthoimages/0/pixel_m"),
-            before_m: both("orthoimage_before.tif", "before"),
+            before_m: [stated_m, other_m - one_m],
             after_m: number("/pairs/0/after/rms_m"),
-            medians_after_m: both("orthoimage.tif", "after"),
+            jitter_m: jitter_m.map(|of| of * of).sum::<f64>().sqrt(),
         }
     }
 
-    /// A known misregistration of many pixels is found within 0.3 of them, and is gone after the adjustment.
+    /// A known misregistration is found, and is gone after the adjustment but for jitter.
     pub(super) fn is_true(&self) {
         println!("{self:.2?}");
         let [stated_m, true_m] = &self.before_m;
         assert!(true_m.norm() > 10.0 * self.pixel_m);
-        assert!((stated_m - true_m).norm() <= 0.3 * self.pixel_m);
-        assert!(self.after_m <= 0.3 * self.pixel_m);
+        // Errors of orientation change along the images, and the squares are not the places that are compared with the truth.
+        let most_px = if self.jitter_m > 0.0 { 0.5 } else { 0.3 };
+        assert!((stated_m - true_m).norm() <= most_px * self.pixel_m);
+        assert!(self.after_m <= (0.3 * self.pixel_m).hypot(self.jitter_m));
     }
 }
 
@@ -322,12 +322,10 @@ fn orthoimages_of_realistic_missions_are_where_they_state() {
             if !is_valid {
                 continue;
             }
-            let apart = Apart::of(&mission, &products);
-            println!("{} of {seed}: {apart:.2?}", site.id);
+            println!("{} of {seed}", site.id);
+            Apart::of(&mission, &products).is_true();
             let (of_site, _) = judged(&mission, &products);
             for Judged { mean, about } in of_site {
-                println!("  z of means {:.2?}", mean.map(|[error_m, sigma_m]| error_m / sigma_m));
-                println!("  about: found {:.2} stated {:.2}", about[0], about[1]);
                 means.extend(mean.map(|[error_m, sigma_m]| error_m / sigma_m));
                 abouts.push(about);
             }
