@@ -118,15 +118,25 @@ fn of_both(products: &Path) -> (usize, [f64; 2]) {
     let table = fs::read_to_string(products.join("orthoimage_offsets.csv")).unwrap();
     let mut rows = table.lines().map(|row| row.split(',').collect::<Vec<_>>());
     let head = rows.next().unwrap();
-    let columns = ["before_east_m", "before_north_m", "after_east_m", "after_north_m"];
+    let columns = [
+        "before_east_m",
+        "before_north_m",
+        "after_east_m",
+        "after_north_m",
+    ];
     let columns = columns.map(|name| head.iter().position(|of| *of == name).unwrap());
     let offsets = rows.filter_map(|row| {
-        let offsets: Vec<f64> = columns.iter().filter_map(|of| row[*of].parse().ok()).collect();
+        let offsets: Vec<f64> = columns
+            .iter()
+            .filter_map(|of| row[*of].parse().ok())
+            .collect();
         <[f64; 4]>::try_from(offsets).ok()
     });
     let offsets: Vec<[f64; 4]> = offsets.collect();
     let rms = |from: usize| {
-        let squares = offsets.iter().map(|of| of[from].powi(2) + of[from + 1].powi(2));
+        let squares = offsets
+            .iter()
+            .map(|of| of[from].powi(2) + of[from + 1].powi(2));
         (squares.sum::<f64>() / offsets.len() as f64).sqrt()
     };
     (offsets.len(), [rms(0), rms(2)])
@@ -175,7 +185,10 @@ fn a_known_misregistration_is_measured_before_the_adjustment_and_gone_after_it()
     for (state, rms_m) in ["before", "after"].iter().zip(rms_m) {
         let stated_m = number(&format!("/{state}/rms_m"));
         // Rounding of the table.
-        assert!((stated_m - rms_m).abs() < 1e-3 * rms_m, "{stated_m} {rms_m}");
+        assert!(
+            (stated_m - rms_m).abs() < 1e-3 * rms_m,
+            "{stated_m} {rms_m}"
+        );
     }
 
     let mosaic = common::json(&products.join("mosaic.json"));

@@ -61,7 +61,11 @@ fn sentence(pair: &Pair<'_>) -> String {
     let of = |of: &Option<Offsets>| {
         let of = of.as_ref()?;
         let cells = label(of.rms_cells?, 2);
-        let places = whole(pair.places_in_both.filter(|of| *of > 0).unwrap_or(of.places));
+        let places = whole(
+            pair.places_in_both
+                .filter(|of| *of > 0)
+                .unwrap_or(of.places),
+        );
         Some(format!(
             "{cells} cells ({} m, {places} places)",
             label(of.rms_m?, 1),
@@ -195,7 +199,10 @@ pub(super) fn mosaic(site: &SiteProducts) -> Result<Markup> {
     };
     let before = before.map(|of| (" before the adjustment", "mosaic_before", &of.account));
     let [seams_before, seams_after] = mosaic::seams(site)?;
-    let seams = [(" before the adjustment", &seams_before), (after, &seams_after)];
+    let seams = [
+        (" before the adjustment", &seams_before),
+        (after, &seams_after),
+    ];
     let states = before.into_iter().chain([(after, "mosaic", &best.account)]);
     let states: Vec<(&str, &str, &MosaicAccount)> = states.collect();
     let look = &best.account.look;

@@ -41,10 +41,8 @@ impl Levels {
         let mut near = by;
         for (factor, [one, other]) in self.each.iter().rev() {
             let step = i64::from(*factor);
-            let template = one.square(
-                middle.map(|at| at.div_euclid(step) - i64::from(HALF)),
-                EDGE,
-            )?;
+            let template =
+                one.square(middle.map(|at| at.div_euclid(step) - i64::from(HALF)), EDGE)?;
             let there = [0, 1].map(|axis| (middle[axis] + near[axis]).div_euclid(step));
             let corner = there.map(|at| at - i64::from(HALF + cells));
             let area = other.square(corner, EDGE + 2 * cells)?;
@@ -55,9 +53,8 @@ impl Levels {
             if !is_found {
                 return None;
             }
-            near = [0, 1].map(|axis| {
-                (corner[axis] + peak.at[axis] as i64 - template.first[axis]) * step
-            });
+            near = [0, 1]
+                .map(|axis| (corner[axis] + peak.at[axis] as i64 - template.first[axis]) * step);
             cells = NEAR;
         }
         Some(near)

@@ -272,9 +272,8 @@ impl Pair<'_> {
             return None;
         }
         let from = template.middle();
-        let whole = Vector2::from_fn(|axis, _| {
-            (by[axis] + peak.at[axis] as i64 - i64::from(reach)) as f64
-        });
+        let whole =
+            Vector2::from_fn(|axis, _| (by[axis] + peak.at[axis] as i64 - i64::from(reach)) as f64);
         let start = Affine {
             from,
             to: from + whole,

@@ -8,12 +8,17 @@ use areograph_geom::random::Random;
 
 /// Ground without repetition: waves of all directions and lengths from 6 to 60 cells, about 120.
 fn waves() -> Vec<[f64; 4]> {
+    waves_to(60.0)
+}
+
+/// The same with waves up to this length, cells.
+fn waves_to(longest: f64) -> Vec<[f64; 4]> {
     let mut random = Random::new(7, "ground");
     let mut wave = || {
-        let length = random.between_log(6.0, 60.0);
+        let length = random.between_log(6.0, longest);
         let (direction, phase) = (random.between(0.0, TAU), random.between(0.0, TAU));
         let [down, across] = [direction.sin(), direction.cos()].map(|of| of * TAU / length);
-        [down, across, phase, length.sqrt()]
+        [down, across, phase, length.sqrt().min(8.0)]
     };
     (0..60).map(|_| wave()).collect()
 }
@@ -66,7 +71,8 @@ fn known_shifts_are_found_between_cells() {
 /// Offsets that drift along the image, between small cells: coarse cells lead to the same offsets as one window.
 #[test]
 fn coarse_cells_lead_to_the_offsets_of_one_window() {
-    let waves = waves();
+    // The reduced orthoimages show the longest ones alone.
+    let waves = waves_to(600.0);
     let size = [620, 520];
     let drift = |row: f64| [0.012 * row - 60.3, 40.6 - 0.008 * row];
     let mut one = orthoimage(0, [0, 0], size, |cell| {
@@ -102,7 +108,8 @@ fn coarse_cells_lead_to_the_offsets_of_one_window() {
         assert_eq!(found, of_window);
     }
     println!("{led} of {matching} places led by coarse cells");
-    assert!(matching >= 30 && led * 10 >= matching * 9);
+    // Squares of coarse cells reach farther, and are not complete near the edges.
+    assert!(matching >= 100 && led * 3 >= matching);
 }
 
 #[test]

@@ -144,7 +144,10 @@ fn places_count_where_the_seam_crosses_their_squares() {
         squares: 3,
         places: vec![place(seam, 3.0), place(seam - 1, -4.0), place(2, 100.0)],
     };
-    let crossed = pair.cells().into_iter().filter(|cell| cell[1] > first[1] + 2);
+    let crossed = pair
+        .cells()
+        .into_iter()
+        .filter(|cell| cell[1] > first[1] + 2);
     let crossed: Vec<[i64; 2]> = crossed.rev().collect();
     let found = made(&strips, &[pair], false).account.seams;
     assert_eq!(found.len(), 1);

@@ -248,7 +248,8 @@ impl Apart {
             assert!(errors_m.len() >= 30);
             errors_m.iter().sum::<Vector2<f64>>() / errors_m.len() as f64
         };
-        let stated_m = Vector2::from_fn(|axis, _| number(&format!("/pairs/0/before/median_m/{axis}")));
+        let stated_m =
+            Vector2::from_fn(|axis, _| number(&format!("/pairs/0/before/median_m/{axis}")));
         let [one_m, other_m] = [0, 1].map(|of| mean_m(&format!("/pairs/0/images/{of}")));
         let jitter_m = document["orthoimages"].as_array().unwrap().iter();
         // Omitted where no scatter was measured.
