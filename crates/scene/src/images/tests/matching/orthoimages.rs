@@ -323,7 +323,7 @@ fn orthoimages_of_realistic_missions_are_where_they_state() {
             if !is_valid {
                 continue;
             }
-            println!("{} of {seed}", site.id);
+            println!("{} of mission {seed}", site.id);
             Apart::of(&mission, &products).is_true();
             let (of_site, _) = judged(&mission, &products);
             for Judged { mean, about } in of_site {
@@ -342,6 +342,7 @@ fn orthoimages_of_realistic_missions_are_where_they_state() {
         square.sqrt()
     );
     assert!(means.iter().all(|of| of.abs() <= 3.0));
-    // Nine sites have 18 axes: chance alone gives 1 ± 0.17, and two of these are allowed.
-    assert!(square.sqrt() <= 1.33 && (0.5..=1.25).contains(&ratio));
+    // Twelve sites have 24 axes, whose errors both images of a pair share: chance alone gives 1 ± 0.14, and two of these are allowed.
+    assert!((0.72..=1.28).contains(&square.sqrt()));
+    assert!((0.8..=1.25).contains(&ratio));
 }
