@@ -106,7 +106,7 @@ class Bench:
         mission = self.folder / "images"
         self.command("scene", "mission", mission, "--images")
         site = mission / "sites/gusev_crater.toml"
-        text = re.sub(r"(?ms)^\[ties\]\n(?:[^\[\n].*\n)*", "[ties]\nmatch = true\n\n", site.read_text())
+        text = re.sub(r"(?m)^\[ties\]\n(?:[^\[\n].*\n)*", "[ties]\nmatch = true\n\n", site.read_text())
         for cell_m in (4 * CELL_M, 2 * CELL_M, CELL_M):
             site.write_text(f"{text}\n[surface]\ncell_m = {cell_m}\n")
             cost = self.run(site)

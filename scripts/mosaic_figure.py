@@ -51,8 +51,9 @@ def detail(site, share, metres):
     return x - half, y - half, x + half, y + half
 
 
-def words(offsets):
-    return f"{offsets['rms_m']:.3g} m rms, {offsets['rms_cells']:.2g} cells, at {offsets['places']} places"
+def words(pair, state):
+    offsets = pair[state]
+    return f"{offsets['rms_m']:.3g} m rms, {offsets['rms_cells']:.2g} cells, at {pair['places_in_both']} places"
 
 
 def main():
@@ -76,7 +77,7 @@ def main():
         both = [stretched(read(of.site / f"images/{image}/orthoimage{end}.tif", bounds)) for image in images]
         colours = axes[1, column]
         colours.imshow(np.dstack([both[0], both[1], both[1]]), extent=extent)
-        colours.set_title(f"both orthoimages in red and cyan\n{words(pair[state])}", fontsize=11)
+        colours.set_title(f"both orthoimages in red and cyan\n{words(pair, state)}", fontsize=11)
     for axis in axes.flat:
         axis.set_xticks([0, 500, 1000, 1500] if of.metres >= 1500 else [0, 0.5 * of.metres, of.metres])
         axis.set_yticks([])

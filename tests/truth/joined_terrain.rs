@@ -6,7 +6,7 @@
     reason = "helpers of tests may fail loudly, and write site files"
 )]
 
-use std::{fs::File, path::Path};
+use std::{fs, fs::File, path::Path};
 
 use areograph::scene::LineScene;
 use tiff::decoder::{Decoder, DecodingResult};
@@ -18,9 +18,63 @@ use crate::{
         pair::write_three_images,
     },
     matched_ties::Points,
+    orthoimages::displace,
 };
 
 const SEED: u64 = 7;
+
+/// Runs a site of the folder, and returns its products.
+fn products(folder: &Path, site: &str, text: &str) -> std::path::PathBuf {
+    let file = folder.join(format!("{site}.toml"));
+    fs::write(&file, text).unwrap();
+    let out = folder.join("out");
+    let mut run = areograph();
+    run.args(["--quiet", "run"]).arg(file);
+    succeed(run.arg("--out").arg(&out));
+    out.join(site)
+}
+
+/// The third image has an error of 300 m of its own, which the adjustment of the others does not state.
+#[test]
+fn an_image_without_tie_points_enters_no_map() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    write_three_images(folder, SEED);
+    displace(&folder.join("third/isd/s2.json"));
+    let text = fs::read_to_string(folder.join("pair.toml")).unwrap();
+    let [surface, third] = [text.find("[surface]"), text.rfind("[[images]]")].map(Option::unwrap);
+    let first = text.find("[[images]]").unwrap();
+    let two = format!("{}{}", &text[..surface], &text[first..third]);
+    let tied = products(folder, "two", &two.replace("\"pair\"\n", "\"two\"\n"));
+    fs::copy(
+        tied.join("exchange/matched_ties.csv"),
+        folder.join("ties.csv"),
+    )
+    .unwrap();
+    assert!(text.contains("match = true"));
+    let all = text.replace("match = true", "files = [\"ties.csv\"]");
+    let products = products(folder, "pair", &all);
+
+    let joint = json(&products.join("surface.json"))["joint"].clone();
+    println!("{joint:#}");
+    for pair in joint["pairs"].as_array().unwrap() {
+        let is_tied = !pair["images"].as_array().unwrap().contains(&"s2".into());
+        assert_eq!(pair.get("bit").is_some(), is_tied, "{pair}");
+    }
+    assert_eq!(joint["several"], 0);
+    let images = |document: &str, list: &str| -> Vec<String> {
+        let of = json(&products.join(document))[list].clone();
+        let of = of.as_array().unwrap().iter();
+        of.map(|of| of["image"].as_str().unwrap().to_owned())
+            .collect()
+    };
+    assert_eq!(images("orthoimages.json", "orthoimages"), ["s1", "nd"]);
+    assert_eq!(images("mosaic.json", "images"), ["s1", "nd"]);
+    for file in ["orthoimage.tif", "orthoimage_before.tif"] {
+        assert!(products.join("images/nd").join(file).exists());
+        assert!(!products.join("images/s2").join(file).exists(), "{file}");
+    }
+}
 
 #[test]
 fn heights_of_all_pairs_are_within_what_they_state() {

@@ -66,7 +66,7 @@ impl Raster {
 }
 
 /// Displaces the positions of support data, which the scene writes in km, along the flight.
-fn displace(path: &Path) {
+pub(crate) fn displace(path: &Path) {
     let mut isd = common::json(path);
     let of = &mut isd["instrument_position"];
     let velocities = of["velocities"].as_array().unwrap().clone();
@@ -113,6 +113,72 @@ fn is_of_its_sources(products: &Path, [mosaic, sources, orthoimage]: [&str; 3], 
     assert!(taken.iter().all(|cells| *cells > 1_000), "{taken:?}");
 }
 
+/// Number of rows of the table that match in both states, and their root mean square offsets before and after, metres.
+fn of_both(products: &Path) -> (usize, [f64; 2]) {
+    let table = fs::read_to_string(products.join("orthoimage_offsets.csv")).unwrap();
+    let mut rows = table.lines().map(|row| row.split(',').collect::<Vec<_>>());
+    let head = rows.next().unwrap();
+    let columns = [
+        "before_east_m",
+        "before_north_m",
+        "after_east_m",
+        "after_north_m",
+    ];
+    let columns = columns.map(|name| head.iter().position(|of| *of == name).unwrap());
+    let offsets = rows.filter_map(|row| {
+        let offsets: Vec<f64> = columns
+            .iter()
+            .filter_map(|of| row[*of].parse().ok())
+            .collect();
+        <[f64; 4]>::try_from(offsets).ok()
+    });
+    let offsets: Vec<[f64; 4]> = offsets.collect();
+    let rms = |from: usize| {
+        let squares = offsets
+            .iter()
+            .map(|of| of[from].powi(2) + of[from + 1].powi(2));
+        (squares.sum::<f64>() / offsets.len() as f64).sqrt()
+    };
+    (offsets.len(), [rms(0), rms(2)])
+}
+
+/// The offsets before and after the adjustment are over the squares that match in both.
+fn is_over_common_squares(products: &Path, pair: &Value) {
+    let (in_both, rms_m) = of_both(products);
+    assert_eq!(pair["places_in_both"], json!(in_both));
+    for (state, rms_m) in ["before", "after"].iter().zip(rms_m) {
+        let stated_m = common::number(&pair[state]["rms_m"]);
+        // Rounding of the table.
+        assert!(
+            (stated_m - rms_m).abs() < 1e-3 * rms_m,
+            "{stated_m} {rms_m}"
+        );
+    }
+}
+
+/// GDAL reads the mosaics with their sizes and empty cells.
+fn are_read_by_gdal(products: &Path) {
+    for name in ["mosaic.tif", "mosaic_source.tif", "mosaic_before.tif"] {
+        let Some(mut gdal) = readers::program("gdalinfo", "mosaics in GDAL") else {
+            return;
+        };
+        let path = products.join(name);
+        let found = readers::output(gdal.args(["-json", "-checksum"]).arg(&path));
+        let found: Value = serde_json::from_str(&found).unwrap();
+        let band = &found["bands"][0];
+        assert_eq!(
+            (&band["type"], &band["noDataValue"]),
+            (&json!("Byte"), &json!(0.0))
+        );
+        let Raster {
+            size: [rows, columns],
+            ..
+        } = Raster::read(&path);
+        assert_eq!(found["size"], json!([columns, rows]));
+        assert!(common::number(&band["checksum"]) > 0.0);
+    }
+}
+
 #[test]
 fn a_known_misregistration_is_measured_before_the_adjustment_and_gone_after_it() {
     let folder = tempfile::tempdir().unwrap();
@@ -151,7 +217,10 @@ fn a_known_misregistration_is_measured_before_the_adjustment_and_gone_after_it()
     assert!((number("/before/rms_m") - ALONG_M).abs() < 0.3 * pixel_m);
     assert!(number("/after/rms_m") <= 0.3 * pixel_m);
 
+    is_over_common_squares(&products, pair);
     let mosaic = common::json(&products.join("mosaic.json"));
+    let [seams, before] = ["seams", "seams_before"].map(|of| &mosaic[of][0]["places"]);
+    assert!(seams == before && common::number(seams) <= number("/places_in_both"));
     let images = mosaic["images"].as_array().unwrap();
     assert!(
         images
@@ -180,23 +249,5 @@ fn a_known_misregistration_is_measured_before_the_adjustment_and_gone_after_it()
     let report = fs::read_to_string(products.join("report/index.html")).unwrap();
     assert!(report.contains("The orthoimages of s1 and nd differ by"));
     assert!(report.contains("At the seam of s1 and nd, the images differ by"));
-    for name in ["mosaic.tif", "mosaic_source.tif", "mosaic_before.tif"] {
-        let Some(mut gdal) = readers::program("gdalinfo", "mosaics in GDAL") else {
-            return;
-        };
-        let path = products.join(name);
-        let found = readers::output(gdal.args(["-json", "-checksum"]).arg(&path));
-        let found: Value = serde_json::from_str(&found).unwrap();
-        let band = &found["bands"][0];
-        assert_eq!(
-            (&band["type"], &band["noDataValue"]),
-            (&json!("Byte"), &json!(0.0))
-        );
-        let Raster {
-            size: [rows, columns],
-            ..
-        } = Raster::read(&path);
-        assert_eq!(found["size"], json!([columns, rows]));
-        assert!(common::number(&band["checksum"]) > 0.0);
-    }
+    are_read_by_gdal(&products);
 }

@@ -6,7 +6,7 @@
 mod fields;
 mod number;
 
-use std::{io::Write as _, path::Path};
+use std::{borrow::Cow, io::Write as _, path::Path};
 
 use flate2::{Compression, write::ZlibEncoder};
 use rayon::prelude::*;
@@ -50,10 +50,10 @@ pub struct GeoTiff<'a, N> {
 }
 
 /// One size of the numbers.
-struct Size<N> {
+struct Size<'a, N: Clone> {
     rows: usize,
     columns: usize,
-    numbers: Vec<N>,
+    numbers: Cow<'a, [N]>,
 }
 
 impl<N: Number + Send + Sync> GeoTiff<'_, N> {
@@ -82,17 +82,20 @@ impl<N: Number + Send + Sync> GeoTiff<'_, N> {
             at += *length;
         }
         bytes.extend(self.tables(&sizes, first, &places));
-        bytes.extend(tiles.iter().rev().flatten().flatten());
+        bytes.reserve(at - bytes.len());
+        for tile in tiles.into_iter().rev().flatten() {
+            bytes.extend_from_slice(&tile);
+        }
         bytes
     }
 
     /// The numbers, and their means over 2 by 2, 4 by 4 … cells until one tile holds them.
-    fn sizes(&self) -> Vec<Size<N>> {
+    fn sizes(&self) -> Vec<Size<'_, N>> {
         let [rows, columns] = self.grid.size;
         let mut sizes = vec![Size {
             rows,
             columns,
-            numbers: self.numbers.to_vec(),
+            numbers: self.numbers.into(),
         }];
         while let Some(last) = sizes.last()
             && last.rows.max(last.columns) > TILE
@@ -103,7 +106,7 @@ impl<N: Number + Send + Sync> GeoTiff<'_, N> {
     }
 
     /// Tables of all sizes, which begin at the byte `at`; `places` are offsets and lengths of tiles.
-    fn tables(&self, sizes: &[Size<N>], at: usize, places: &[Vec<[usize; 2]>]) -> Vec<u8> {
+    fn tables(&self, sizes: &[Size<'_, N>], at: usize, places: &[Vec<[usize; 2]>]) -> Vec<u8> {
         let mut bytes = Vec::new();
         for (number, (size, places)) in sizes.iter().zip(places).enumerate() {
             let mut fields = size.fields(places, number > 0);
@@ -211,7 +214,7 @@ impl<N> GeoTiff<'_, N> {
     }
 }
 
-impl<N: Number + Send + Sync> Size<N> {
+impl<N: Number + Send + Sync> Size<'_, N> {
     fn across(&self) -> [usize; 2] {
         [self.rows.div_ceil(TILE), self.columns.div_ceil(TILE)]
     }
@@ -266,7 +269,7 @@ impl<N: Number + Send + Sync> Size<N> {
     }
 
     /// Means of two by two cells, of those that have a number.
-    fn halved(&self) -> Self {
+    fn halved(&self) -> Size<'static, N> {
         let (rows, columns) = (self.rows.div_ceil(2), self.columns.div_ceil(2));
         let mut numbers = Vec::with_capacity(rows * columns);
         for row in 0..rows {
@@ -278,10 +281,10 @@ impl<N: Number + Send + Sync> Size<N> {
                 numbers.push(if is_empty { N::NONE } else { N::mean(known) });
             }
         }
-        Self {
+        Size {
             rows,
             columns,
-            numbers,
+            numbers: numbers.into(),
         }
     }
 }

@@ -24,11 +24,18 @@ const BEFORE: usize = 1;
 const AFTER: usize = 0;
 /// Rows at the upper and lower edge of a detail on which the images are marked, and the colours of the marks.
 const MARKED: usize = 8;
-const MARKS: [(&str, [u8; 3]); 4] = [
-    ("orange", [230, 159, 0]),
-    ("blue", [86, 180, 233]),
-    ("green", [0, 158, 115]),
-    ("purple", [204, 121, 167]),
+/// Tol 2021, *Colour schemes*, "muted": distinct for colour-blind readers; and black.
+const MARKS: [(&str, [u8; 3]); 10] = [
+    ("sand", [221, 204, 119]),
+    ("indigo", [51, 34, 136]),
+    ("cyan", [136, 204, 238]),
+    ("wine", [136, 34, 85]),
+    ("green", [17, 119, 51]),
+    ("rose", [204, 102, 119]),
+    ("teal", [68, 170, 153]),
+    ("purple", [170, 68, 153]),
+    ("olive", [153, 153, 51]),
+    ("black", [0, 0, 0]),
 ];
 
 /// Offsets of every pair: a sentence, a table and a map; empty without overlapping orthoimages.
@@ -41,7 +48,7 @@ pub(super) fn compared(site: &SiteProducts) -> Result<Markup> {
         p {
             @for pair in &pairs { (sentence(pair)) " " }
             "Squares of the first orthoimage are searched in the second by cross-correlation on an even grid; no offset takes part \
-             in another product. Every place: " (link("../orthoimage_offsets.csv", "orthoimage_offsets.csv")) "."
+             in another product. Offsets before and after the adjustment are over the squares that match in both. Every place: " (link("../orthoimage_offsets.csv", "orthoimage_offsets.csv")) "."
         }
         (table(&pairs))
         div.plots { (arrows(site)?) }
@@ -54,10 +61,14 @@ fn sentence(pair: &Pair<'_>) -> String {
     let of = |of: &Option<Offsets>| {
         let of = of.as_ref()?;
         let cells = label(of.rms_cells?, 2);
+        let places = whole(
+            pair.places_in_both
+                .filter(|of| *of > 0)
+                .unwrap_or(of.places),
+        );
         Some(format!(
-            "{cells} cells ({} m, {} places)",
+            "{cells} cells ({} m, {places} places)",
             label(of.rms_m?, 1),
-            whole(of.places)
         ))
     };
     let both = format!("The orthoimages of {one} and {other} differ by");
@@ -83,6 +94,7 @@ fn table(pairs: &[Pair<'_>]) -> Markup {
             Column::Text("orientation"),
             Column::Number("compared squares"),
             Column::Number("matching"),
+            Column::Number("matching in both"),
             Column::Number("rms (m)"),
             Column::Number("rms (cells)"),
             Column::Number("median: east, north (m)"),
@@ -99,6 +111,11 @@ fn table(pairs: &[Pair<'_>]) -> Markup {
             ("before", before, &pair.before),
             ("after", "after the adjustment", &pair.after),
         ];
+        let in_both = || {
+            let known = pair.places_in_both.map(whole).map(Cell::from);
+            let place = format!("orthoimages.json#/pairs/{index}/places_in_both");
+            known.map_or_else(|| Cell::from("not known"), |of| of.traced(&place))
+        };
         for (name, words, of) in states {
             let Some(of) = of else { continue };
             let optional = |value: Option<f64>, place: &str| {
@@ -117,6 +134,7 @@ fn table(pairs: &[Pair<'_>]) -> Markup {
                     words.into(),
                     Cell::from(whole(of.squares)).traced("/squares"),
                     Cell::from(whole(of.places)).traced("/places"),
+                    in_both(),
                     optional(of.rms_m, "/rms_m"),
                     optional(of.rms_cells, "/rms_cells"),
                     two(of.median_m, signed, "/median_m"),
@@ -180,6 +198,11 @@ pub(super) fn mosaic(site: &SiteProducts) -> Result<Markup> {
         ""
     };
     let before = before.map(|of| (" before the adjustment", "mosaic_before", &of.account));
+    let [seams_before, seams_after] = mosaic::seams(site)?;
+    let seams = [
+        (" before the adjustment", &seams_before),
+        (after, &seams_after),
+    ];
     let states = before.into_iter().chain([(after, "mosaic", &best.account)]);
     let states: Vec<(&str, &str, &MosaicAccount)> = states.collect();
     let look = &best.account.look;
@@ -195,7 +218,7 @@ pub(super) fn mosaic(site: &SiteProducts) -> Result<Markup> {
             @if site.config.surface.mosaic_balance {
                 "A gain and an offset for each image balance the tones. "
             }
-            @for (state, _, of) in &states { @for seam in seams(site, state, of) { (seam) " " } }
+            @for (state, seams) in seams { @for seam in seams { (of_seam(state, seam)) " " } }
         }
         div.pieces {
             @for (state, name, of) in &states { (detail(site, state, name, of)?) }
@@ -204,17 +227,14 @@ pub(super) fn mosaic(site: &SiteProducts) -> Result<Markup> {
     })
 }
 
-/// The offsets along every seam in words.
-fn seams(site: &SiteProducts, state: &str, account: &MosaicAccount) -> Vec<String> {
-    let seams = account.seams.iter().map(|seam| {
-        let [one, other] = seam.images.map(|image| &site.images[image].times.id);
-        format!(
-            "At the seam of {one} and {other}, the images differ by {} m{state} (root mean square, {} places).",
-            label(seam.rms_m, 1),
-            whole(seam.places)
-        )
-    });
-    seams.collect()
+/// The offsets along a seam in words.
+fn of_seam(state: &str, seam: &mosaic::Seam<'_>) -> String {
+    let [one, other] = seam.images;
+    format!(
+        "At the seam of {one} and {other}, the images differ by {} m{state} (root mean square, {} places).",
+        label(seam.rms_m, 1),
+        whole(seam.places)
+    )
 }
 
 /// A detail at a seam, with links to the files of the mosaic.

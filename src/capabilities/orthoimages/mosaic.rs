@@ -1,15 +1,16 @@
 //! The mosaic of orthoimages: brightness, sources, and statistics.
 
-use std::path::Path;
+use std::{collections::BTreeSet, path::Path};
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::products::write_cells;
+use super::products::{States, write_cells};
 use crate::{
     error::Result,
     products::{Content, Context, Declaration, Label, Role, SiteProducts, Write, write_json},
     schema::DocumentSchema,
+    stage::Round,
     stages::mosaic_images::{Mosaic, MosaicAccount},
 };
 
@@ -201,14 +202,61 @@ struct Part<'a> {
 
 /// A seam between two images.
 #[derive(Serialize, JsonSchema)]
-struct Seam<'a> {
+pub(super) struct Seam<'a> {
     /// Identifiers of the images.
-    images: [&'a str; 2],
-    /// Number of compared squares that it crosses.
-    places: u32,
+    pub(super) images: [&'a str; 2],
+    /// Number of compared squares that it crosses. With both mosaics, squares count that match before and after the adjustment and that
+    /// the seam of either mosaic crosses, the same for both; if there is none, each seam has its own.
+    pub(super) places: u32,
     /// Root mean square offset in them, both axes together.
     #[schemars(range(min = 0.0))]
-    rms_m: f64,
+    pub(super) rms_m: f64,
+}
+
+/// The seams of the mosaic before the adjustment, if there is one, and of the best one.
+pub(super) fn seams<'a>(site: &SiteProducts<'a>) -> Result<[Vec<Seam<'a>>; 2]> {
+    let (before, best) = (before(site)?, best(site)?);
+    let accounts = [before, best].map(|of| of.map_or(&[][..], |of| &of.account.seams));
+    let mut pairs: Vec<[usize; 2]> = accounts.concat().iter().map(|of| of.images).collect();
+    pairs.sort_unstable();
+    pairs.dedup();
+    let mut seams = [Vec::new(), Vec::new()];
+    for images in pairs {
+        let states = States::of(site, images)?;
+        let crossed = accounts.map(|of| {
+            let seam = of.iter().find(|of| of.images == images);
+            seam.map_or_else(BTreeSet::new, |of| of.cells.iter().copied().collect())
+        });
+        let common = states.in_both().filter(|_| before.is_some());
+        let common = common.map(|cells| {
+            let of_either = crossed[0].union(&crossed[1]).copied();
+            of_either.filter(|cell| cells.contains(cell)).collect()
+        });
+        let common = common.filter(|cells: &BTreeSet<_>| !cells.is_empty());
+        let ids = images.map(|image| &*site.images[image].times.id);
+        for (state, crossed) in crossed.iter().enumerate() {
+            // The offsets of the best mosaic of a site without an adjustment are those of its kernels.
+            let round = usize::from(state == 1 && site.book.has::<Option<Mosaic>>(Round::Adjusted));
+            let Some(cells) = common
+                .as_ref()
+                .or(Some(crossed))
+                .filter(|of| !of.is_empty())
+            else {
+                continue;
+            };
+            let Some(offsets) = states.chosen(round, Some(cells)) else {
+                continue;
+            };
+            if let Some(rms_m) = offsets.rms_m() {
+                seams[state].push(Seam {
+                    images: ids,
+                    places: u32::try_from(offsets.places.len()).unwrap_or(u32::MAX),
+                    rms_m,
+                });
+            }
+        }
+    }
+    Ok(seams)
 }
 
 impl<'a> Document<'a> {
@@ -222,14 +270,7 @@ impl<'a> Document<'a> {
             offset: of.tone[1],
             cells: of.cells,
         });
-        let seams = |of: &'a MosaicAccount| -> Vec<Seam<'a>> {
-            let seams = of.seams.iter().map(|seam| Seam {
-                images: seam.images.map(id),
-                places: seam.places,
-                rms_m: seam.rms_m,
-            });
-            seams.collect()
-        };
+        let [seams_before, seams] = seams(site)?;
         Ok(Self {
             format: "areograph mosaic 1",
             site: &site.config.site,
@@ -237,8 +278,8 @@ impl<'a> Document<'a> {
             rows,
             columns,
             images: images.collect(),
-            seams: seams(account),
-            seams_before: before(site)?.map(|of| seams(&of.account)),
+            seams,
+            seams_before: before(site)?.map(|_| seams_before),
         })
     }
 }

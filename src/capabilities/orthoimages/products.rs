@@ -1,6 +1,6 @@
 //! Orthoimages: brightness and positional uncertainty on the map of the terrain model, and their statistics.
 
-use std::path::Path;
+use std::{collections::BTreeSet, path::Path};
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -187,6 +187,10 @@ struct Document<'a> {
 pub(super) struct Pair<'a> {
     /// Identifiers of the images.
     pub(super) images: [&'a str; 2],
+    /// Number of squares that match before and after the adjustment. The statistics of both states are over these squares; if none
+    /// matches in both, each state is over its own. Omitted if only one state was computed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) places_in_both: Option<u32>,
     /// With the orientation from the kernels; omitted if it was not computed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) before: Option<Offsets>,
@@ -200,7 +204,7 @@ pub(super) struct Pair<'a> {
 pub(super) struct Offsets {
     /// Number of compared squares.
     pub(super) squares: u32,
-    /// Number of squares that match.
+    /// Number of squares that match in this state.
     pub(super) places: u32,
     /// Root mean square offset, both axes together; omitted if no square matches.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -216,17 +220,49 @@ pub(super) struct Offsets {
 }
 
 impl Offsets {
-    fn of(pair: &OrthoimageOffsets) -> Self {
-        let summaries_m = pair.summaries_m();
-        let rms_m = pair.rms_m();
+    /// Statistics over the squares of `chosen`, a part of those of the pair.
+    fn of(pair: &OrthoimageOffsets, chosen: &OrthoimageOffsets) -> Self {
+        let summaries_m = chosen.summaries_m();
+        let rms_m = chosen.rms_m();
         Self {
             squares: pair.squares,
-            places: summaries_m[0].n,
+            places: u32::try_from(pair.places.len()).unwrap_or(u32::MAX),
             rms_m,
             rms_cells: rms_m.map(|rms_m| rms_m / pair.cell_m),
             median_m: summaries_m.map(|of| of.median),
             sigma_m: summaries_m.map(|of| of.nmad),
         }
+    }
+}
+
+/// Offsets of one pair before and after the adjustment.
+pub(super) struct States<'a>([Option<&'a OrthoimageOffsets>; 2]);
+
+impl<'a> States<'a> {
+    /// Of this pair of images.
+    pub(super) fn of(site: &SiteProducts<'a>, images: [usize; 2]) -> Result<Self> {
+        let of = |round| -> Result<Option<&'a OrthoimageOffsets>> {
+            Ok(offsets(site, round)?.iter().find(|of| of.images == images))
+        };
+        Ok(Self([of(Round::Initial)?, of(Round::Adjusted)?]))
+    }
+
+    /// Cells of the squares that match in both states; `None` if only one was computed.
+    pub(super) fn in_both(&self) -> Option<BTreeSet<[i64; 2]>> {
+        let [before, after] = self.0;
+        let (before, after) = (before?.cells(), after?.cells());
+        Some(before.intersection(&after).copied().collect())
+    }
+
+    /// The offsets of a state in these cells; in all of its own without a cell of both.
+    pub(super) fn chosen(
+        &self,
+        state: usize,
+        cells: Option<&BTreeSet<[i64; 2]>>,
+    ) -> Option<OrthoimageOffsets> {
+        let of = self.0[state]?;
+        let cells = cells.filter(|cells| !cells.is_empty());
+        Some(cells.map_or_else(|| of.clone(), |cells| of.in_cells(cells)))
     }
 }
 
@@ -247,16 +283,25 @@ pub(super) fn pairs<'a>(site: &SiteProducts<'a>) -> Result<Vec<Pair<'a>>> {
     let mut images: Vec<[usize; 2]> = before.iter().chain(after).map(|of| of.images).collect();
     images.sort_unstable();
     images.dedup();
-    let pairs = images.into_iter().map(|images| {
-        let of =
-            |all: &[OrthoimageOffsets]| all.iter().find(|of| of.images == images).map(Offsets::of);
-        Pair {
+    let pair = |images| {
+        let states = States::of(site, images)?;
+        let in_both = states.in_both();
+        let of = |state: usize| {
+            let chosen = states.chosen(state, in_both.as_ref());
+            states.0[state]
+                .zip(chosen)
+                .map(|(of, chosen)| Offsets::of(of, &chosen))
+        };
+        Ok(Pair {
             images: images.map(|image| &*site.images[image].times.id),
-            before: of(before),
-            after: of(after),
-        }
-    });
-    Ok(pairs.collect())
+            places_in_both: in_both
+                .as_ref()
+                .map(|cells| u32::try_from(cells.len()).unwrap_or(u32::MAX)),
+            before: of(0),
+            after: of(1),
+        })
+    };
+    images.into_iter().map(pair).collect()
 }
 
 /// An orthoimage.

@@ -1,7 +1,7 @@
 //! Kinds of numbers in a file.
 
 /// A kind of number in a file.
-pub trait Number: Copy {
+pub trait Number: Copy + 'static {
     /// Bits, and format of the sample: 1 without a sign, 3 with decimals.
     const LAYOUT: [usize; 2];
     /// Cells without a number, as readers of the file find them.

@@ -4,7 +4,8 @@
 //! Both orthoimages show the same ground on the same cells. A square of the first is searched in the second by normalised
 //! cross-correlation at whole cells, around the shift at which the complete orthoimages, reduced, correlate best; least-squares
 //! matching, which maximises the same correlation between cells, gives the offset and its standard deviation. Squares lie on
-//! an even grid, without overlap.
+//! an even grid, without overlap. Where the window around that shift is large (`coarse.rs`), it is searched in reduced orthoimages
+//! first, and completely where these do not decide.
 //!
 //! No offset takes part in what made the orthoimages. Their orientation may come from tie points matched in the same
 //! images; these are measured in images, not in orthoimages, and at other places.
@@ -17,9 +18,10 @@
     reason = "numbers of cells of a map are far below 2⁶³"
 )]
 
+mod coarse;
 mod shift;
 
-use std::sync::atomic::AtomicBool;
+use std::{collections::BTreeSet, sync::atomic::AtomicBool};
 
 use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
@@ -31,7 +33,7 @@ use super::{
 };
 use areograph_base::{error::Result, watch::Watch};
 use areograph_geom::{
-    imaging::{Affine, match_least_squares, search},
+    imaging::{Affine, Patch, match_least_squares, search},
     statistics::Summary,
 };
 use areograph_store::{
@@ -39,6 +41,7 @@ use areograph_store::{
     stage_inputs,
 };
 
+use coarse::{Levels, NEAR};
 use shift::{Shift, shift};
 
 /// Half the edge of a compared square, cells, and its edge.
@@ -110,6 +113,22 @@ impl OrthoimageOffsets {
         (!self.places.is_empty()).then(|| (squares_m2.sum::<f64>() / count).sqrt())
     }
 
+    /// Its cells of places.
+    #[must_use]
+    pub fn cells(&self) -> BTreeSet<[i64; 2]> {
+        self.places.iter().map(|of| of.cell).collect()
+    }
+
+    /// Its offsets in these cells.
+    #[must_use]
+    pub fn in_cells(&self, cells: &BTreeSet<[i64; 2]>) -> Self {
+        let places = self.places.iter().filter(|of| cells.contains(&of.cell));
+        Self {
+            places: places.copied().collect(),
+            ..*self
+        }
+    }
+
     /// Statistics of the offsets, east and north, metres.
     #[must_use]
     pub fn summaries_m(&self) -> [Summary; 2] {
@@ -119,6 +138,7 @@ impl OrthoimageOffsets {
 
 impl Stage for CompareOrthoimages<'_> {
     const NAME: &'static str = "compare_orthoimages";
+    const METHOD: u32 = 2;
     type Output = Vec<OrthoimageOffsets>;
     stage_inputs!(fingerprint);
 
@@ -147,10 +167,16 @@ impl Stage for CompareOrthoimages<'_> {
 fn offsets(first: &Orthoimage, second: &Orthoimage) -> Option<OrthoimageOffsets> {
     let [one, other] = [first, second].map(|of| Raster::of(&of.account.map, &of.brightness));
     let shift = shift(&one, &other, first.account.cell_m)?;
-    let middles = middles(&one);
+    let levels = Levels::of([&one, &other], ROOM + shift.factor);
+    let pair = Pair {
+        account: &first.account,
+        one,
+        other,
+    };
+    let middles = middles(&pair.one);
     let found: Vec<Option<Found>> = middles
         .par_iter()
-        .map(|middle| found(&one, &other, &first.account, *middle, &shift))
+        .map(|middle| pair.found(*middle, &shift, &levels))
         .collect();
     let squares = found.iter().flatten().count();
     let mut offsets = OrthoimageOffsets {
@@ -204,55 +230,73 @@ fn middles(raster: &Raster<'_>) -> Vec<[i64; 2]> {
 /// The offset of a square in both orthoimages; `None` in it where it does not match.
 type Found = Option<PlaceOffset>;
 
-/// What is found at a place; `None` where an orthoimage lacks a cell.
-fn found(
-    one: &Raster<'_>,
-    other: &Raster<'_>,
-    account: &OrthoimageAccount,
-    middle: [i64; 2],
-    shift: &Shift,
-) -> Option<Found> {
-    let reach = ROOM + shift.factor;
-    let template = one.square(middle.map(|at| at - i64::from(HALF)), EDGE)?;
-    let corner = [0, 1].map(|axis| middle[axis] + shift.by[axis] - i64::from(HALF + reach));
-    let area = other.square(corner, EDGE + 2 * reach)?;
-    let Some(peak) = search(&template, &area) else {
-        return Some(None);
-    };
-    let inside = 1..2 * reach as usize;
-    let is_found =
-        peak.at.iter().all(|at| inside.contains(at)) && peak.correlation - peak.second >= DISTINCT;
-    if !is_found {
-        return Some(None);
+/// Two orthoimages.
+struct Pair<'a> {
+    /// Of the first.
+    account: &'a OrthoimageAccount,
+    one: Raster<'a>,
+    other: Raster<'a>,
+}
+
+impl Pair<'_> {
+    /// What is found at a place; `None` where an orthoimage lacks a cell.
+    fn found(&self, middle: [i64; 2], shift: &Shift, levels: &Levels) -> Option<Found> {
+        let reach = ROOM + shift.factor;
+        let template = self
+            .one
+            .square(middle.map(|at| at - i64::from(HALF)), EDGE)?;
+        let corner = [0, 1].map(|axis| middle[axis] + shift.by[axis] - i64::from(HALF + reach));
+        if !self.other.is_filled(corner, EDGE + 2 * reach) {
+            return None;
+        }
+        let near = levels.near(middle, shift.by, reach);
+        let near = near.and_then(|by| self.matched(&template, middle, by, NEAR));
+        Some(near.or_else(|| self.matched(&template, middle, shift.by, reach)))
     }
-    let from = template.middle();
-    let whole = Vector2::from_fn(|axis, _| {
-        (shift.by[axis] + peak.at[axis] as i64 - i64::from(reach)) as f64
-    });
-    let start = Affine {
-        from,
-        to: from + whole,
-        matrix: Matrix2::identity(),
-    };
-    let Ok(matched) = match_least_squares(&template, &area, &start) else {
-        return Some(None);
-    };
-    let by = matched.affine.to - from;
-    let is_near = (by - whole).amax() <= MOVED_MAX;
-    if !is_near || matched.correlation < CORRELATION_MIN {
-        return Some(None);
+
+    /// The offset of a square, searched within `reach` cells around the shift `by`.
+    fn matched(
+        &self,
+        template: &Patch,
+        middle: [i64; 2],
+        by: [i64; 2],
+        reach: u32,
+    ) -> Option<PlaceOffset> {
+        let corner = [0, 1].map(|axis| middle[axis] + by[axis] - i64::from(HALF + reach));
+        let area = self.other.square(corner, EDGE + 2 * reach)?;
+        let peak = search(template, &area)?;
+        let inside = 1..2 * reach as usize;
+        let is_found = peak.at.iter().all(|at| inside.contains(at))
+            && peak.correlation - peak.second >= DISTINCT;
+        if !is_found {
+            return None;
+        }
+        let from = template.middle();
+        let whole =
+            Vector2::from_fn(|axis, _| (by[axis] + peak.at[axis] as i64 - i64::from(reach)) as f64);
+        let start = Affine {
+            from,
+            to: from + whole,
+            matrix: Matrix2::identity(),
+        };
+        let matched = match_least_squares(template, &area, &start).ok()?;
+        let by = matched.affine.to - from;
+        let is_near = (by - whole).amax() <= MOVED_MAX;
+        if !is_near || matched.correlation < CORRELATION_MIN {
+            return None;
+        }
+        let [east_m, north_m] = self.account.map.cell_m();
+        let variances = matched.covariance_px2.diagonal();
+        let here = [0, 1].map(|axis| (middle[axis] - self.one.first[axis]) as f64);
+        Some(PlaceOffset {
+            cell: middle,
+            place_rad: self.account.map.place_rad(here),
+            // Rows count southwards.
+            offset_m: [by.y * east_m, -by.x * north_m],
+            sigma_m: [variances.y.sqrt() * east_m, variances.x.sqrt() * north_m],
+            correlation: matched.correlation,
+        })
     }
-    let [east_m, north_m] = account.map.cell_m();
-    let variances = matched.covariance_px2.diagonal();
-    let here = [0, 1].map(|axis| (middle[axis] - one.first[axis]) as f64);
-    Some(Some(PlaceOffset {
-        cell: middle,
-        place_rad: account.map.place_rad(here),
-        // Rows count southwards.
-        offset_m: [by.y * east_m, -by.x * north_m],
-        sigma_m: [variances.y.sqrt() * east_m, variances.x.sqrt() * north_m],
-        correlation: matched.correlation,
-    }))
 }
 
 #[cfg(test)]

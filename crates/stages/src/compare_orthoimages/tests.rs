@@ -8,12 +8,17 @@ use areograph_geom::random::Random;
 
 /// Ground without repetition: waves of all directions and lengths from 6 to 60 cells, about 120.
 fn waves() -> Vec<[f64; 4]> {
+    waves_to(60.0)
+}
+
+/// The same with waves up to this length, cells.
+fn waves_to(longest: f64) -> Vec<[f64; 4]> {
     let mut random = Random::new(7, "ground");
     let mut wave = || {
-        let length = random.between_log(6.0, 60.0);
+        let length = random.between_log(6.0, longest);
         let (direction, phase) = (random.between(0.0, TAU), random.between(0.0, TAU));
         let [down, across] = [direction.sin(), direction.cos()].map(|of| of * TAU / length);
-        [down, across, phase, length.sqrt()]
+        [down, across, phase, length.sqrt().min(8.0)]
     };
     (0..60).map(|_| wave()).collect()
 }
@@ -61,6 +66,50 @@ fn known_shifts_are_found_between_cells() {
             assert!(place.sigma_m.iter().all(|of| *of < 0.1 * CELL_M) && place.correlation > 0.9);
         }
     }
+}
+
+/// Offsets that drift along the image, between small cells: coarse cells lead to the same offsets as one window.
+#[test]
+fn coarse_cells_lead_to_the_offsets_of_one_window() {
+    // The reduced orthoimages show the longest ones alone.
+    let waves = waves_to(600.0);
+    let size = [620, 520];
+    let drift = |row: f64| [0.012 * row - 60.3, 40.6 - 0.008 * row];
+    let mut one = orthoimage(0, [0, 0], size, |cell| {
+        ground(&waves, cell.map(|at| at as f64))
+    });
+    let other = orthoimage(1, [0, 0], size, |cell| {
+        let [row, column] = cell.map(|at| at as f64);
+        let [down, across] = drift(row);
+        ground(&waves, [row - down, column - across])
+    });
+    // Cells of half a metre: errors of a kilometre are 63 reduced cells of 32.
+    one.account.cell_m = 0.5;
+    let [first, second] = [&one, &other].map(|of| Raster::of(&of.account.map, &of.brightness));
+    let shift = shift(&first, &second, 0.5).unwrap();
+    let reach = ROOM + shift.factor;
+    assert_eq!(reach, 75);
+    let levels = Levels::of([&first, &second], reach);
+    let pair = Pair {
+        account: &one.account,
+        one: first,
+        other: second,
+    };
+    let (mut led, mut matching) = (0, 0);
+    for middle in middles(&pair.one) {
+        let Some(found) = pair.found(middle, &shift, &levels) else {
+            continue;
+        };
+        let template = pair.one.square(middle.map(|at| at - i64::from(HALF)), EDGE);
+        let of_window = pair.matched(&template.unwrap(), middle, shift.by, reach);
+        led += i32::from(levels.near(middle, shift.by, reach).is_some());
+        matching += i32::from(of_window.is_some());
+        // Both begin at the same whole cell.
+        assert_eq!(found, of_window);
+    }
+    println!("{led} of {matching} places led by coarse cells");
+    // Squares of coarse cells reach farther, and are not complete near the edges.
+    assert!(matching >= 100 && led * 3 >= matching);
 }
 
 #[test]

@@ -93,8 +93,8 @@ pub struct MosaicAccount {
     pub cell_m: f64,
     /// Its orthoimages.
     pub images: Vec<MosaicPart>,
-    /// Offsets along the seams.
-    pub seams: Vec<SeamOffsets>,
+    /// Compared places along the seams.
+    pub seams: Vec<SeamPlaces>,
     /// The mosaic in larger cells, for display.
     pub look: OrthoimageLook,
     /// Cells around a seam near the middle; `None` without a seam.
@@ -112,15 +112,13 @@ pub struct MosaicPart {
     pub cells: u32,
 }
 
-/// Offsets of two images where a seam between them passes.
+/// Places of two images where a seam between them passes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct SeamOffsets {
+pub struct SeamPlaces {
     /// Indices of the images.
     pub images: [usize; 2],
-    /// Number of compared squares that the seam crosses.
-    pub places: u32,
-    /// Root mean square offset in them, both axes together, metres.
-    pub rms_m: f64,
+    /// Cells of the places ([`PlaceOffset::cell`]) whose squares the seam crosses.
+    pub cells: Vec<[i64; 2]>,
 }
 
 /// Cells around a seam.
@@ -166,6 +164,7 @@ impl Mosaic {
 
 impl Stage for MosaicImages<'_> {
     const NAME: &'static str = "mosaic_images";
+    const METHOD: u32 = 2;
     type Output = Option<Mosaic>;
     stage_inputs!(fingerprint);
 
@@ -364,12 +363,12 @@ fn composed(
         .map(|()| made)
 }
 
-/// Offsets of a pair in the squares that its seam crosses; `None` without one.
+/// Places of a pair whose squares its seam crosses; `None` without one.
 fn seam(
     pair: &OrthoimageOffsets,
     parts: &[MosaicPart],
     sources: &Raster<'_>,
-) -> Option<SeamOffsets> {
+) -> Option<SeamPlaces> {
     let number = |image: usize| (1_u8..).zip(parts).find(|(_, of)| of.image == image);
     let [one, other] = pair
         .images
@@ -387,14 +386,11 @@ fn seam(
         }
         found == [true; 2]
     };
-    let crossed = OrthoimageOffsets {
-        places: pair.places.iter().filter(is_crossed).copied().collect(),
-        ..*pair
-    };
-    Some(SeamOffsets {
+    let crossed = pair.places.iter().filter(is_crossed);
+    let cells: Vec<[i64; 2]> = crossed.map(|of| of.cell).collect();
+    (!cells.is_empty()).then_some(SeamPlaces {
         images: pair.images,
-        places: u32::try_from(crossed.places.len()).unwrap_or(u32::MAX),
-        rms_m: crossed.rms_m()?,
+        cells,
     })
 }
 

@@ -123,7 +123,7 @@ fn balanced_tones_leave_no_step_at_the_seam() {
 }
 
 #[test]
-fn offsets_count_where_the_seam_crosses_their_squares() {
+fn places_count_where_the_seam_crosses_their_squares() {
     let strips = strips();
     let mosaic = made(&strips, &[], false);
     let columns = mosaic.account.map.size[1];
@@ -144,10 +144,14 @@ fn offsets_count_where_the_seam_crosses_their_squares() {
         squares: 3,
         places: vec![place(seam, 3.0), place(seam - 1, -4.0), place(2, 100.0)],
     };
+    let crossed = pair
+        .cells()
+        .into_iter()
+        .filter(|cell| cell[1] > first[1] + 2);
+    let crossed: Vec<[i64; 2]> = crossed.rev().collect();
     let found = made(&strips, &[pair], false).account.seams;
     assert_eq!(found.len(), 1);
-    assert_eq!(found[0].places, 2);
-    assert!((found[0].rms_m - 12.5_f64.sqrt()).abs() < 1e-12); // rounding
+    assert_eq!((found[0].images, &found[0].cells), ([0, 1], &crossed));
 }
 
 #[test]

@@ -110,27 +110,32 @@ impl Cells {
         let map = self.map();
         let tiles = Tile::all([rows, columns], TILE, 1, 0);
         watch.announce(tiles.len());
-        let of_tiles = tiles.par_iter().map(|tile| {
-            watch.check()?;
-            let brightness = self.of_tile(view, &sight_lines.shown, &map, tile);
-            watch.step(1, "tiles");
-            brightness
-        });
-        let of_tiles: Vec<Brightness> = of_tiles.collect::<Result<_>>()?;
-        let mut all = Brightness {
-            pixels: vec![0; rows * columns],
-            without_pixels: 0,
-        };
-        for (tile, of_tile) in tiles.iter().zip(&of_tiles) {
-            let [down, across] = &tile.cells;
-            let lines = of_tile.pixels.chunks_exact(across.len());
-            for (row, pixels) in down.clone().zip(lines) {
-                let start = row * columns + across.start;
-                all.pixels[start..start + across.len()].copy_from_slice(pixels);
+        let across = columns.div_ceil(TILE);
+        let mut pixels = vec![0; rows * columns];
+        // Rows of tiles, each with its part of the cells.
+        let of_rows = tiles
+            .par_chunks(across)
+            .zip(pixels.par_chunks_mut(TILE * columns));
+        let without_pixels = of_rows.map(|(tiles, pixels)| {
+            let mut without_pixels = 0;
+            for tile in tiles {
+                watch.check()?;
+                let found = self.of_tile(view, &sight_lines.shown, &map, tile)?;
+                let across = &tile.cells[1];
+                let rows = pixels.chunks_exact_mut(columns);
+                for (row, pixels) in rows.zip(found.pixels.chunks_exact(across.len())) {
+                    row[across.clone()].copy_from_slice(pixels);
+                }
+                without_pixels += found.without_pixels;
+                watch.step(1, "tiles");
             }
-            all.without_pixels += of_tile.without_pixels;
-        }
-        Ok(all)
+            Ok(without_pixels)
+        });
+        let without_pixels: Vec<u32> = without_pixels.collect::<Result<_>>()?;
+        Ok(Brightness {
+            pixels,
+            without_pixels: without_pixels.iter().sum(),
+        })
     }
 
     #[allow(

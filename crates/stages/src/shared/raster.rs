@@ -60,17 +60,26 @@ impl<'a> Raster<'a> {
         self.index(cell).map_or(0, |at| self.pixels[at])
     }
 
+    /// Whether all cells of a square have a brightness.
+    pub(crate) fn is_filled(&self, first: [i64; 2], edge: u32) -> bool {
+        let last = first.map(|at| at + i64::from(edge) - 1);
+        let Some((start, _)) = self.index(first).zip(self.index(last)) else {
+            return false;
+        };
+        let edge = edge as usize;
+        (0..edge).all(|row| !self.pixels[start + row * self.size[1]..][..edge].contains(&0))
+    }
+
     /// A square; `None` where one of its cells has no brightness.
     pub(crate) fn square(&self, first: [i64; 2], edge: u32) -> Option<Patch> {
-        let last = first.map(|at| at + i64::from(edge) - 1);
+        if !self.is_filled(first, edge) {
+            return None;
+        }
+        let start = self.index(first)?;
         let edge = edge as usize;
-        let [start, _] = [self.index(first)?, self.index(last)?];
         let mut values = Vec::with_capacity(edge * edge);
         for row in 0..edge {
             let pixels = &self.pixels[start + row * self.size[1]..][..edge];
-            if pixels.contains(&0) {
-                return None;
-            }
             values.extend(pixels.iter().copied().map(f32::from));
         }
         Some(Patch {
@@ -118,6 +127,25 @@ impl<'a> Raster<'a> {
 }
 
 impl Reduced {
+    /// A square, its place in cells of this size; `None` where one of its cells has no brightness.
+    pub(crate) fn square(&self, first: [i64; 2], edge: u32) -> Option<Patch> {
+        let edge = edge as usize;
+        let [top, left] = [0, 1].map(|axis| {
+            let at = usize::try_from(first[axis] - self.first[axis]).ok();
+            at.filter(|at| at + edge <= self.size[axis])
+        });
+        let (top, left) = (top?, left?);
+        let rows = top..top + edge;
+        let values = rows.flat_map(|row| &self.values[row * self.size[1] + left..][..edge]);
+        let values: Vec<f32> = values.copied().collect();
+        let is_filled = values.iter().all(|value| !value.is_nan());
+        is_filled.then_some(Patch {
+            first,
+            size: [edge; 2],
+            values,
+        })
+    }
+
     /// Number of cells with a brightness.
     pub(crate) fn known(&self) -> usize {
         self.values.iter().filter(|of| !of.is_nan()).count()
@@ -179,11 +207,16 @@ mod tests {
         let square = raster.square([3, 0], 2).unwrap();
         assert_eq!(square.values, [3.0, 4.0, 7.0, 8.0]);
         assert!(raster.square([3, -2], 2).is_none() && raster.square([3, 1], 2).is_none());
+        assert!(raster.is_filled([3, 0], 2) && !raster.is_filled([3, -2], 2));
+        assert!(!raster.is_filled([2, 0], 2) && !raster.is_filled([3, 1], 2));
         // Rows 2 and 3, and 4 and 5: each has half of its cells or fewer.
         let reduced = raster.reduced(2);
         assert_eq!((reduced.first, reduced.size), ([1, -1], [2, 2]));
         assert_eq!(reduced.values[..2], [1.5, 3.5]);
         assert!(reduced.values[2].is_nan());
         assert_eq!(reduced.known(), 3);
+        let square = reduced.square([1, -1], 1).unwrap();
+        assert_eq!((square.first, square.values), ([1, -1], vec![1.5]));
+        assert!(reduced.square([1, -1], 2).is_none() && reduced.square([1, 0], 2).is_none());
     }
 }

@@ -28,8 +28,8 @@ use areograph_geom::{
 /// Half the edge of a compared square, and the largest shift, cells.
 const HALF: i64 = 12;
 const REACH: i64 = 8;
-/// Largest error of a place, cells.
-const FAR: i64 = 70;
+/// Largest error of a place, cells: those of kernels reach 90.
+const FAR: i64 = 110;
 /// Distance of compared squares, cells.
 const APART: usize = 150;
 
@@ -225,28 +225,53 @@ fn errors_m(mission: &Mission, id: &str, orthoimage: &Published) -> Vec<Vector2<
     orthoimage.errors_m(&mission.image(id), &mission.terrain, &pixels)
 }
 
-/// The offsets of the first pair before the adjustment are the difference of the errors of its orthoimages against the true
-/// ground, and those after it are small.
-pub(super) fn offsets_are_true(mission: &Mission, products: &Path) {
-    let document = fs::read(products.join("orthoimages.json")).unwrap();
-    let document: serde_json::Value = serde_json::from_slice(&document).unwrap();
-    let number = |place: &str| document.pointer(place).unwrap().as_f64().unwrap();
-    let mean_m = |place: &str| {
-        let id = document.pointer(place).unwrap().as_str().unwrap();
-        let before = Published::of(products, id, "orthoimage_before.tif");
-        let errors_m = errors_m(mission, id, &before);
-        assert!(errors_m.len() >= 30);
-        errors_m.iter().sum::<Vector2<f64>>() / errors_m.len() as f64
-    };
-    let expected_m = mean_m("/pairs/0/images/1") - mean_m("/pairs/0/images/0");
-    let found_m = Vector2::from_fn(|axis, _| number(&format!("/pairs/0/before/median_m/{axis}")));
-    let after_m = number("/pairs/0/after/rms_m");
-    println!("offsets before: {found_m:.2?} m, true {expected_m:.2?} m; after: rms {after_m:.2} m");
-    let pixel_m = number("/orthoimages/0/pixel_m");
-    // A known misregistration of many pixels, found within 0.3 of them.
-    assert!(expected_m.norm() > 10.0 * pixel_m);
-    assert!((found_m - expected_m).norm() <= 0.3 * pixel_m);
-    assert!(after_m <= 0.3 * pixel_m);
+/// Offsets of the first pair of a site as the products state them, and as the true ground has them, metres.
+#[derive(Debug)]
+pub(super) struct Apart {
+    pub(super) pixel_m: f64,
+    /// Median before the adjustment, stated and true.
+    pub(super) before_m: [Vector2<f64>; 2],
+    /// Root mean square after it, and the stated jitter of both orthoimages.
+    pub(super) after_m: f64,
+    pub(super) jitter_m: f64,
+}
+
+impl Apart {
+    pub(super) fn of(mission: &Mission, products: &Path) -> Self {
+        let document = fs::read(products.join("orthoimages.json")).unwrap();
+        let document: serde_json::Value = serde_json::from_slice(&document).unwrap();
+        let number = |place: &str| document.pointer(place).unwrap().as_f64().unwrap();
+        let mean_m = |place: &str| {
+            let id = document.pointer(place).unwrap().as_str().unwrap();
+            let before = Published::of(products, id, "orthoimage_before.tif");
+            let errors_m = errors_m(mission, id, &before);
+            assert!(errors_m.len() >= 30);
+            errors_m.iter().sum::<Vector2<f64>>() / errors_m.len() as f64
+        };
+        let stated_m =
+            Vector2::from_fn(|axis, _| number(&format!("/pairs/0/before/median_m/{axis}")));
+        let [one_m, other_m] = [0, 1].map(|of| mean_m(&format!("/pairs/0/images/{of}")));
+        let jitter_m = document["orthoimages"].as_array().unwrap().iter();
+        // Omitted where no scatter was measured.
+        let jitter_m = jitter_m.filter_map(|of| of.get("jitter_m")?.as_f64());
+        Self {
+            pixel_m: number("/orthoimages/0/pixel_m"),
+            before_m: [stated_m, other_m - one_m],
+            after_m: number("/pairs/0/after/rms_m"),
+            jitter_m: jitter_m.map(|of| of * of).sum::<f64>().sqrt(),
+        }
+    }
+
+    /// A known misregistration is found, and is gone after the adjustment but for jitter.
+    pub(super) fn is_true(&self) {
+        println!("{self:.2?}");
+        let [stated_m, true_m] = &self.before_m;
+        assert!(true_m.norm() > 10.0 * self.pixel_m);
+        // Errors of orientation change along the images, and the squares are not the places that are compared with the truth.
+        let most_px = if self.jitter_m > 0.0 { 0.5 } else { 0.3 };
+        assert!((stated_m - true_m).norm() <= most_px * self.pixel_m);
+        assert!(self.after_m <= (0.3 * self.pixel_m).hypot(self.jitter_m));
+    }
 }
 
 /// The errors of all orthoimages of a site, and how far those of the first two are apart, root mean square in cells.
@@ -281,6 +306,7 @@ fn orthoimages_of_realistic_missions_are_where_they_state() {
         (26_001, Roughness::Plains),
         (26_002, Roughness::Medium),
         (26_003, Roughness::Varied),
+        (26_004, Roughness::Medium),
     ] {
         let folder = tempfile::tempdir().unwrap();
         let options = SceneOptions {
@@ -297,6 +323,8 @@ fn orthoimages_of_realistic_missions_are_where_they_state() {
             if !is_valid {
                 continue;
             }
+            println!("{} of mission {seed}", site.id);
+            Apart::of(&mission, &products).is_true();
             let (of_site, _) = judged(&mission, &products);
             for Judged { mean, about } in of_site {
                 means.extend(mean.map(|[error_m, sigma_m]| error_m / sigma_m));
@@ -314,6 +342,7 @@ fn orthoimages_of_realistic_missions_are_where_they_state() {
         square.sqrt()
     );
     assert!(means.iter().all(|of| of.abs() <= 3.0));
-    // Nine sites have 18 axes: chance alone gives 1 ± 0.17, and two of these are allowed.
-    assert!(square.sqrt() <= 1.33 && (0.5..=1.25).contains(&ratio));
+    // Twelve sites have 24 axes, whose errors both images of a pair share: chance alone gives 1 ± 0.14, and two of these are allowed.
+    assert!((0.72..=1.28).contains(&square.sqrt()));
+    assert!((0.8..=1.25).contains(&ratio));
 }
