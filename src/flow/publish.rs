@@ -30,7 +30,7 @@ use crate::{
 };
 
 /// Raised when the layout of products changes.
-const METHOD: u32 = 43;
+const METHOD: u32 = 44;
 
 /// The products of a site.
 pub(super) struct SitePublication<'a> {

@@ -140,7 +140,7 @@ stage_inputs! {
 
 impl Stage for ComparePairs<'_> {
     const NAME: &'static str = "compare_pairs";
-    const METHOD: u32 = 7;
+    const METHOD: u32 = 8;
     type Output = Vec<PairComparison>;
     stage_inputs!(fingerprint);
 
@@ -166,7 +166,7 @@ impl Stage for ComparePairs<'_> {
     }
 }
 
-/// Compares all pairs of `images` that share tie points.
+/// Compares all pairs of `images` that share tie points and have different positions.
 ///
 /// `registrations` go with `images`. Blunders among the tie points are excluded.
 ///
@@ -203,13 +203,12 @@ pub fn compare_pairs<M: ExteriorOrientation>(
                 line_spacing_m[1],
             );
             let mola_spacing_m = median(spacings.iter().flatten().copied());
-            pairs.push(shared.compare(
-                images,
-                footprints.body.model(),
-                line_spacing_m,
-                by_ties,
-                mola_spacing_m,
-            ));
+            let body = footprints.body.model();
+            let compared = shared.compare(images, body, line_spacing_m, by_ties, mola_spacing_m);
+            // Two images of one exposure have no base, and nothing to compare.
+            if compared.height_over_base.is_finite() {
+                pairs.push(compared);
+            }
         }
     }
     pairs
