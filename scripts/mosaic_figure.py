@@ -53,7 +53,7 @@ def detail(site, share, metres):
 
 def words(pair, state):
     offsets = pair[state]
-    return f"{offsets['rms_m']:.3g} m rms, {offsets['rms_cells']:.2g} cells, at {pair['places_in_both']} places"
+    return f"{offsets['rms_m']:.3g} m rms, {offsets['rms_cells']:.2g} cells, at {pair.get('places_in_both') or offsets['places']} places"
 
 
 def main():

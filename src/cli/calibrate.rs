@@ -17,8 +17,13 @@ use crate::{
     config::{CalibrationConfig, CamerasConfig},
     error::{Cause, IoError, Locate as _, Result},
     flow::Task,
+    pds::isd::{ImageSupport, read_isd},
     stages::calibrate::apply_calibration,
-    store::{atomic, files::file_name, published::read_published},
+    store::{
+        atomic,
+        files::file_name,
+        published::{is_site_folder, read_published},
+    },
 };
 
 /// Calibrates the lines of a camera in orbit, first from tie points, then from laser points, some of which are withheld for
@@ -85,12 +90,15 @@ enum ApplyError {
     #[error("{0} holds no calibrated cameras; expected the products of `areograph calibrate`")]
     #[cause("name the folder of the calibration")]
     NoCalibration(String),
-    #[error("two support data would become {0}; expected different names")]
+    #[error("two inputs would be written to {0}; expected different names")]
     #[cause("apply the calibration in two steps, with different folders after --to")]
     SameName(String),
-    #[error("would replace its own input; expected another folder")]
+    #[error("--to is {0}, in the products of a run; expected a folder apart from products")]
     #[cause("name another folder with --to")]
-    OwnInput,
+    Products(String),
+    #[error("exists, and is not calibrated support data; expected no file of this name")]
+    #[cause("name another folder with --to")]
+    Exists,
 }
 
 /// Runs the calibration and reports the outcome, or applies one.
@@ -128,14 +136,18 @@ fn apply(arguments: &ApplyArguments) -> Result<()> {
     if cameras.is_empty() {
         return Err(ApplyError::NoCalibration(folder.display().to_string()).into());
     }
+    let to = std::path::absolute(&arguments.to)
+        .map_err(IoError::on("find"))
+        .in_file(&arguments.to)?;
+    if to.ancestors().any(is_site_folder) {
+        return Err(ApplyError::Products(arguments.to.display().to_string()).into());
+    }
     let mut applied = BTreeMap::new();
     for isd in &arguments.isds {
         let path = arguments.to.join(name_of(isd));
-        let is_own = path
-            .canonicalize()
-            .is_ok_and(|path| isd.canonicalize().is_ok_and(|isd| isd == path));
-        if is_own {
-            return Err(ApplyError::OwnInput).in_file(isd);
+        let is_replaced = |found: ImageSupport| found.instrument.calibration.is_some();
+        if path.exists() && !read_isd(&path).is_ok_and(is_replaced) {
+            return Err(ApplyError::Exists).in_file(&path);
         }
         let result = apply_calibration(&cameras, isd)?;
         if applied.insert(path.clone(), result).is_some() {
@@ -161,6 +173,7 @@ fn apply(arguments: &ApplyArguments) -> Result<()> {
 /// File name of the support data; products of sites, `isd.json`, are named after their folder, the image.
 fn name_of(isd: &Path) -> String {
     let name = file_name(isd);
+    let isd = isd.canonicalize().unwrap_or_else(|_| isd.to_owned());
     match isd.parent().and_then(Path::file_name) {
         Some(image) if name == "isd.json" => format!("{}.json", image.to_string_lossy()),
         _ => name,

@@ -18,7 +18,7 @@ use crate::{
 };
 
 /// Raised when the layout of the products of a calibration changes.
-const METHOD: u32 = 13;
+const METHOD: u32 = 14;
 
 /// Calibrates the lines of a camera and publishes the products.
 pub(super) fn calibration<D: Driver>(flow: &mut D, config: &CalibrationConfig) -> Flow<()> {

@@ -8,6 +8,7 @@
 mod answers;
 mod archive;
 mod bounds;
+mod calibrated_images;
 mod calibration;
 mod calibration_rounds;
 mod check;

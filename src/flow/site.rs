@@ -1,7 +1,7 @@
 //! The flow of one site, described once: [`site`] is driven by run and plan, its two halves by check.
 
 use super::{
-    LOAD_KERNELS, PUBLISH,
+    LOAD_KERNELS, PUBLISH, calibrated_images,
     choice::{ChooseKernels, KernelChoice, RivalKernelSets, rival_positions},
     driver::{Exit, Flow, SiteDriver},
     kernels::{load_kernels, required_coverage},
@@ -56,7 +56,7 @@ use crate::{
         tag_times::{ImageTimes, TagTimes},
         tag_utc::TagUtc,
     },
-    store::{book::Book, published::read_published},
+    store::book::Book,
 };
 
 /// The names of all steps in order, for `--until`.
@@ -137,12 +137,7 @@ pub(super) fn prepare<D: SiteDriver>(flow: &mut D, config: &SiteConfig) -> Flow<
     let clocks = kernels(flow, config, Some(&RequiredCoverage::default()), 0)?;
     let images = {
         let kernels = &KernelView::text(clocks.as_ref());
-        if let Some(from) = &config.calibration.from {
-            flow.attempt(TagTimes::NAME, |_| read_published(from).map(drop))?;
-        }
-        let calibration = config.calibration.cameras();
-        let kind = SizedFile::SupportData;
-        let calibration = &*flow.hash_sized(TagTimes::NAME, kind, &calibration)?;
+        let calibration = &*calibrated_images::files(flow, config)?;
         let tag = |image: &ImageConfig| {
             let source = image.source().map_or(&[][..], std::slice::from_ref);
             // A cube has its pixels beside its label.
@@ -171,7 +166,9 @@ pub(super) fn prepare<D: SiteDriver>(flow: &mut D, config: &SiteConfig) -> Flow<
                 kernels,
             })
         };
-        config.images.iter().map(tag).collect::<Flow<Vec<_>>>()?
+        let images = config.images.iter().map(tag).collect::<Flow<Vec<_>>>()?;
+        calibrated_images::require_one(flow, config, &images)?;
+        images
     };
     let found = found(flow, config, &images, clocks.as_ref())?;
     let converted = flow.stage(&ConvertDatum {

@@ -372,6 +372,30 @@ fn refused(case: &Case, isd: &[String; 2]) {
     let told = applied("out/h5270", "other.json");
     let expected = "other.json: the calibration has no camera MEX_HRSC_IR, only MEX_HRSC_S1, MEX_HRSC_S2; expected a calibration of the line";
     assert!(told.contains(expected), "{told}");
+    // Products of a run and files of other programs are not replaced.
+    let to = |folder: &str| {
+        let mut apply = case.areograph();
+        apply.args(["calibrate", "apply", "out/h5270", &isd[0], "--to", folder]);
+        case.outcome(apply)
+    };
+    let printed = to("out/h5270/cameras/s1");
+    assert!(printed.contains("in the products of a run"), "{printed}");
+    case.write(&format!("own/{}.json", name(&LINES[0])), "{}");
+    let printed = to("own");
+    let expected = "exists, and is not calibrated support data";
+    assert!(printed.contains(expected), "{printed}");
+    // Support data have their own camera: a calibration would change nothing.
+    let site = String::from_utf8(case.read("calibrated.toml")).unwrap();
+    case.write(
+        "unused.toml",
+        site.replace("site = 'calibrated'", "site = 'unused'")
+            + "[calibration]\nfrom = 'out/h5270'\n",
+    );
+    let mut run = case.areograph();
+    run.args(["run", "unused.toml", "--out", "out"]);
+    let printed = case.outcome(run);
+    let expected = "calibration.from applies to no image of the site";
+    assert!(printed.contains(expected), "{printed}");
     // Without laser points the pointing is not determined.
     let told = case.outcome(calibrate(case, "ties_only", ""));
     assert!(told.contains("ties_only: INVALID"), "{told}");

@@ -203,7 +203,7 @@ fn the_terrain_model_and_the_laser_units_are_products() {
     );
     // A shift does not change the height offset of the first model, which lowers its concordance; the last one has none.
     assert!(median(1) > median(0), "{} {}", median(0), median(1));
-    assert_eq!(median(0) > 0.9, long(), "{}", median(0));
+    assert!(!long() || median(0) > 0.9, "{}", median(0));
     let model = read_terrain_model(
         &RUN.folder.join("surface_above_sphere.tif"),
         Body::Mars,

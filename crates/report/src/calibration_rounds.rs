@@ -1,7 +1,7 @@
 //! The rounds of a calibration from pixels: a table and a figure.
 
 use super::{
-    html::{Cell, Column, Markup, Table, html},
+    html::{Cell, Column, Markup, Table, html, link},
     numbers::signed,
     plots::{Panel, Plot, Series, figure, label},
 };
@@ -75,8 +75,8 @@ fn concordances(of: &CalibrationModel<'_>) -> Markup {
     );
     let words = "Every fourth shot of a unit takes no part in the search for its shift. The concordance (Li et al. 2023, eq. 18 and \
                  Table 4) is 1 only for equal heights. The model of the first round contains the errors of orbit and mounting; \
-                 that of the last round is made with the cameras of the preceding round. `units.parquet` contains all units.";
-    html! { p { (words) } (table.finish()) }
+                 that of the last round is made with the cameras of the preceding round. All units: ";
+    html! { p { (words) (link("../units.csv", "units.csv")) "." } (table.finish()) }
 }
 
 fn text(value: Option<f64>, decimals: usize) -> Cell {

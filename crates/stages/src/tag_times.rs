@@ -14,28 +14,24 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use agreement::Disagreement;
-use agreement::{mounting_agrees, of_one_clock, of_one_product, start_agrees, stop_agrees};
-use camera::camera_agrees;
+use agreement::{mounting_agrees, of_one_clock, start_agrees, stop_agrees};
+use camera::{calibrated, calibrated_note, camera_agrees, labelled};
 use detector::{PartOfLine, fits_detector};
 use error::ImageError;
 use pieces::{Pieces, rows_of};
 pub use support::SupportFile;
 use support::supported;
 
-use crate::calibrated_camera::calibrated_camera;
 use areograph_base::{
     body::Body,
     error::{Locate, Result},
     image::ImageFields,
-    instruments::{Calibrated, Instrument},
+    instruments::Instrument,
     line_times::LineTimes,
     time::{Et, Interval},
 };
-use areograph_config::{
-    ImageConfig, PointingConfig, UsedBias, all_instruments, built_in_instruments, usual_instrument,
-};
+use areograph_config::{ImageConfig, PointingConfig, UsedBias, all_instruments};
 use areograph_geom::pushbroom::Detector;
-use areograph_pds::{ImageLabel, read_label};
 use areograph_spice::{KernelView, Session};
 use areograph_store::{
     files::HashedFile,
@@ -272,13 +268,8 @@ fn image_times(
     session: &Session,
 ) -> Result<ImageTimes> {
     let (mut notes, mut remarks) = (Vec::new(), Vec::new());
-    let (mut instrument, label) = labelled(image)?;
-    let files = calibration.iter().map(|file| &*file.path);
-    let sensor = instrument.sensor_name().to_owned();
-    if let Some(found) = calibrated_camera(&instrument, &sensor, files)? {
-        notes.extend(found.camera.calibration.as_ref().map(calibrated_note));
-        instrument = found.camera;
-    }
+    let (instrument, label) = labelled(image)?;
+    let instrument = calibrated(instrument, calibration, &mut notes)?;
     let session = &session.of(instrument.spacecraft);
     let utc_stop = label.as_ref().and_then(|label| label.utc_stop.clone());
     let tells_lines = label.is_some() && !instrument.spacecraft.labels_tell_clock;
@@ -364,14 +355,6 @@ fn image_times(
     })
 }
 
-/// A note on an image with a calibrated camera.
-fn calibrated_note(of: &Calibrated) -> String {
-    format!(
-        "its camera is the result of the calibration {}: its boresight is not compared with that of the built-in camera",
-        of.calibration
-    )
-}
-
 /// Lines in the delivered file, with a note when they are fewer than in the header.
 fn lines_delivered(
     image: &ImageConfig,
@@ -394,22 +377,6 @@ fn lines_delivered(
         ));
     }
     Ok(delivered)
-}
-
-/// The camera that the configuration names, else the label's, else the first known one; and the label.
-fn labelled(image: &ImageConfig) -> Result<(Instrument, Option<ImageLabel>)> {
-    let Some(path) = &image.label else {
-        let named = image.instrument.as_ref();
-        let camera = named.unwrap_or_else(|| usual_instrument());
-        return Ok((camera.clone(), None));
-    };
-    let cameras = match &image.instrument {
-        Some(named) => std::slice::from_ref(named),
-        None => built_in_instruments(),
-    };
-    let label = read_label(path, cameras)?;
-    of_one_product(image, ("label belongs to", label.product_id.as_deref()))?;
-    Ok((label.instrument.clone(), Some(label)))
 }
 
 /// Configuration over label, with a note for every key in which they differ.

@@ -15,7 +15,7 @@ use areograph_base::error::{Cause, IoError, Locate, Result};
 pub enum PublishedError {
     /// Nothing was published.
     #[error("there is no {MANIFEST}, so there are no products")]
-    #[cause("name the products folder of a site whose run is complete")]
+    #[cause("name the products folder of a complete run")]
     NoManifest,
     /// A run was killed, or is in progress, while files received their final names.
     #[error("the publication of products into this folder was not finished")]
@@ -23,7 +23,9 @@ pub enum PublishedError {
     Unfinished,
     /// The manifest is damaged, or of a version with other entries.
     #[error("this is not a manifest of areograph {}: {reason}", env!("CARGO_PKG_VERSION"))]
-    #[cause("run the site again: damaged products are rewritten")]
+    #[cause(
+        "run areograph again on the configuration file of these products: damaged products are rewritten"
+    )]
     Unreadable {
         /// The parser's reason, with line and column.
         reason: String,

@@ -48,7 +48,11 @@ pub(super) fn compared(site: &SiteProducts) -> Result<Markup> {
         p {
             @for pair in &pairs { (sentence(pair)) " " }
             "Squares of the first orthoimage are searched in the second by cross-correlation on an even grid; no offset takes part \
-             in another product. Offsets before and after the adjustment are over the squares that match in both. Every place: " (link("../orthoimage_offsets.csv", "orthoimage_offsets.csv")) "."
+             in another product. "
+            @if pairs.iter().any(|pair| pair.places_in_both.is_some_and(|places| places > 0)) {
+                "Offsets before and after the adjustment are over the squares that match in both. "
+            }
+            "Every place: " (link("../orthoimage_offsets.csv", "orthoimage_offsets.csv")) "."
         }
         (table(&pairs))
         div.plots { (arrows(site)?) }
@@ -114,7 +118,7 @@ fn table(pairs: &[Pair<'_>]) -> Markup {
         let in_both = || {
             let known = pair.places_in_both.map(whole).map(Cell::from);
             let place = format!("orthoimages.json#/pairs/{index}/places_in_both");
-            known.map_or_else(|| Cell::from("not known"), |of| of.traced(&place))
+            known.map_or_else(|| Cell::from("–"), |of| of.traced(&place))
         };
         for (name, words, of) in states {
             let Some(of) = of else { continue };

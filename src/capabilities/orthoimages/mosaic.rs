@@ -237,13 +237,11 @@ pub(super) fn seams<'a>(site: &SiteProducts<'a>) -> Result<[Vec<Seam<'a>>; 2]> {
         for (state, crossed) in crossed.iter().enumerate() {
             // The offsets of the best mosaic of a site without an adjustment are those of its kernels.
             let round = usize::from(state == 1 && site.book.has::<Option<Mosaic>>(Round::Adjusted));
-            let Some(cells) = common
-                .as_ref()
-                .or(Some(crossed))
-                .filter(|of| !of.is_empty())
-            else {
+            // A seam of one mosaic only is not one of the other.
+            if crossed.is_empty() {
                 continue;
-            };
+            }
+            let cells = common.as_ref().unwrap_or(crossed);
             let Some(offsets) = states.chosen(round, Some(cells)) else {
                 continue;
             };

@@ -284,7 +284,6 @@ fn calibration(document: &Object<'_>) -> Result<Option<Calibrated>, IsdError> {
     Ok(Some(Calibrated {
         calibration: origin.text("calibration")?.to_owned(),
         camera: origin.text("camera")?.to_owned(),
-        // Earlier versions did not state the verdict.
-        valid: !origin.has("verdict") || origin.text("verdict")? == VALID,
+        valid: origin.has("verdict") && origin.text("verdict")? == VALID,
     }))
 }

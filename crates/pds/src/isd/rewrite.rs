@@ -61,6 +61,8 @@ const CAMERA_KEYS: [&str; 7] = [
     "optical_distortion",
     CALIBRATED_BY,
 ];
+/// Beginnings of notes on the camera.
+const CAMERA_NOTES: [&str; 2] = ["optical_distortion", "detector coordinates"];
 /// The mounting, and the frames that it leads from and to.
 const POINTING: &str = "instrument_pointing";
 const MOUNTING_KEYS: [&str; 2] = ["constant_rotation", "constant_frames"];
@@ -83,6 +85,14 @@ impl SupportSource<'_> {
         self.located(Object::document(&support).and_then(|of| of.object(POINTING)))?;
         for key in CAMERA_KEYS {
             support[key] = other.located(document.any(key))?.clone();
+        }
+        // Notes of areograph on the camera that is replaced.
+        if let Some(notes) = support["areograph"]["notes"].as_array_mut() {
+            let is_of_camera = |note: &Value| {
+                let note = note.as_str().unwrap_or_default();
+                CAMERA_NOTES.iter().any(|start| note.starts_with(start))
+            };
+            notes.retain(|note| !is_of_camera(note));
         }
         for key in MOUNTING_KEYS {
             support[POINTING][key] = other.located(pointing.any(key))?.clone();

@@ -118,7 +118,7 @@ fn calibrated(site: &SiteProducts) -> String {
     format!(
         "The cameras of {} are calibrated. Camera models (ISD) contain the calibrated camera. Kernels contain the attitude of the\n\
          spacecraft only: programs that take the mounting and the optics of the camera from SPICE kernels, such as ISIS,\n\
-         do not see these images as calibrated.\n\n",
+         do not apply the calibration.\n\n",
         names.join(", ")
     )
 }

@@ -24,9 +24,7 @@ pub struct AppliedCalibration {
 
 /// Support data of another spacecraft than that of the calibration.
 #[derive(Debug, thiserror::Error, Cause)]
-#[error(
-    "the camera {0} belongs to another spacecraft than the calibration; expected an image of the calibrated camera"
-)]
+#[error("the spacecraft is {0}; expected the spacecraft of the calibration")]
 #[cause(Input: "name support data of the calibrated lines")]
 struct OtherSpacecraft(String);
 
@@ -37,9 +35,12 @@ struct OtherSpacecraft(String);
 /// # Errors
 /// Files that cannot be read; a calibration that is invalid, or does not contain this line.
 pub fn apply_calibration(calibrated: &[PathBuf], isd: &Path) -> Result<AppliedCalibration> {
-    let given = read_isd(isd)?.instrument;
-    let found = calibrated_camera(&given, &given.name, calibrated.iter().map(PathBuf::as_path));
-    let found = found.and_then(|found| Ok(found.ok_or(OtherSpacecraft(given.name.clone()))?));
+    let support = read_isd(isd)?;
+    let given = support.instrument;
+    let names = [&*support.platform, &*given.name];
+    let found = calibrated_camera(&given, names, calibrated.iter().map(PathBuf::as_path));
+    let found =
+        found.and_then(|found| Ok(found.ok_or_else(|| OtherSpacecraft(support.platform.clone()))?));
     let found = found.in_file(isd)?;
     Ok(AppliedCalibration {
         moved_px: found.moved_rad / pixel_rad(&given),

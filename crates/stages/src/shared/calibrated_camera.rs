@@ -26,6 +26,16 @@ enum ForeignCalibration {
     )]
     #[cause("leave this image out, or calibrate its line as well")]
     OtherLine { sensor: String, known: String },
+    #[error(
+        "attitudes of the camera {sensor} refer to the frame {found} in the calibration and to {expected} for this image; expected \
+         one frame of the spacecraft"
+    )]
+    #[cause("calibrate support data whose attitudes refer to this frame")]
+    OtherFrame {
+        sensor: String,
+        found: i32,
+        expected: i32,
+    },
     #[error("not the result of a calibration; expected the key areograph_calibration")]
     #[cause("name the folder that `areograph calibrate` wrote, with its files unchanged")]
     NotCalibrated,
@@ -56,29 +66,38 @@ pub(crate) struct CalibratedCamera {
     pub(crate) moved_rad: f64,
 }
 
-/// The calibration of `camera`, which support data call `sensor`, among the calibrated support data `files`; `None`
-/// if these are of other spacecraft or there are none.
+/// The calibration of `camera`, whose spacecraft and sensor have the names `platform` and `sensor` in support data, among the
+/// calibrated support data `files`; `None` if these are of other spacecraft or there are none.
 ///
 /// # Errors
 /// A file that cannot be read or is not the result of a calibration; an invalid calibration; a calibration without this
 /// line, or of another camera.
 pub(crate) fn calibrated_camera<'a>(
     camera: &Instrument,
-    sensor: &str,
+    [platform, sensor]: [&str; 2],
     files: impl IntoIterator<Item = &'a Path>,
 ) -> Result<Option<CalibratedCamera>> {
     let mut others = Vec::new();
     for file in files {
-        let found = read_isd(file)?.instrument;
+        let support = read_isd(file)?;
+        let found = support.instrument;
         let Some(of) = found.calibration.clone() else {
             return Err(ForeignCalibration::NotCalibrated).in_file(file);
         };
-        if found.spacecraft.id != camera.spacecraft.id {
+        if !support.platform.eq_ignore_ascii_case(platform) {
             continue;
         }
-        if found.name != sensor || found.naif.bus != camera.naif.bus {
+        if found.name != sensor {
             others.push(found.name);
             continue;
+        }
+        if found.naif.bus != camera.naif.bus {
+            let refused = ForeignCalibration::OtherFrame {
+                sensor: found.name,
+                found: found.naif.bus,
+                expected: camera.naif.bus,
+            };
+            return Err(refused).in_file(file);
         }
         if !of.valid {
             return Err(ForeignCalibration::Invalid(of.calibration)).in_file(file);

@@ -1,7 +1,14 @@
 //! A camera that the site defines against the built-in camera of the same frame.
 
-use super::agreement::{Disagreement, HEIGHT_M, ground};
-use areograph_base::instruments::Instrument;
+use super::agreement::{Disagreement, HEIGHT_M, ground, of_one_product};
+use crate::calibrated_camera::calibrated_camera;
+use areograph_base::{
+    error::Result,
+    instruments::{Calibrated, Instrument},
+};
+use areograph_config::{ImageConfig, built_in_instruments, usual_instrument};
+use areograph_pds::{ImageLabel, read_label};
+use areograph_store::files::HashedFile;
 
 /// Pixel angles of one camera that differ by less are within what its files state: the kernel and ISIS differ by 1 %
 /// for the narrow-angle camera, whose focal length is known to 2 %.
@@ -71,6 +78,45 @@ pub(super) fn camera_agrees(camera: &Instrument, known: &[Instrument]) -> Option
         ),
         ground_m,
     })
+}
+
+/// The camera that the configuration names, else the label's, else the first known one; and the label.
+pub(super) fn labelled(image: &ImageConfig) -> Result<(Instrument, Option<ImageLabel>)> {
+    let Some(path) = &image.label else {
+        let named = image.instrument.as_ref();
+        let camera = named.unwrap_or_else(|| usual_instrument());
+        return Ok((camera.clone(), None));
+    };
+    let cameras = match &image.instrument {
+        Some(named) => std::slice::from_ref(named),
+        None => built_in_instruments(),
+    };
+    let label = read_label(path, cameras)?;
+    of_one_product(image, ("label belongs to", label.product_id.as_deref()))?;
+    Ok((label.instrument.clone(), Some(label)))
+}
+
+/// The camera by its calibration among `files`, with a note; unchanged where none applies.
+pub(super) fn calibrated(
+    camera: Instrument,
+    files: &[HashedFile],
+    notes: &mut Vec<String>,
+) -> Result<Instrument> {
+    let names = [&*camera.spacecraft.label_name, camera.sensor_name()];
+    let paths = files.iter().map(|file| &*file.path);
+    let Some(found) = calibrated_camera(&camera, names, paths)? else {
+        return Ok(camera);
+    };
+    notes.extend(found.camera.calibration.as_ref().map(calibrated_note));
+    Ok(found.camera)
+}
+
+/// A note on an image with a calibrated camera.
+pub(super) fn calibrated_note(of: &Calibrated) -> String {
+    format!(
+        "the camera is the result of the calibration {}: the boresight is not compared with that of the built-in camera",
+        of.calibration
+    )
 }
 
 #[cfg(test)]

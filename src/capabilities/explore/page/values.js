@@ -148,7 +148,10 @@ for (let row = 0; row < shots.count; row += 1) profileRows[shots.profile.numbers
 
 // The footprint before each one in its profile, or −1, and the distance from it, metres.
 const previous = new Int32Array(shots.count).fill(-1);
-for (const rows of profileRows) rows.forEach((row, at) => { if (at) previous[row] = rows[at - 1]; });
+// Large sites show every n-th footprint: then the one before is not on the page.
+for (const rows of profileRows) rows.forEach((row, at) => {
+  if (at && shots.row.numbers[row] - shots.row.numbers[rows[at - 1]] === 1) previous[row] = rows[at - 1];
+});
 function pointOf(row) {
   const [longitude, latitude] = [shots.longitude_deg.at(row) * degree, shots.latitude_deg.at(row) * degree];
   const radius = shots.ground_radius_m.at(row);

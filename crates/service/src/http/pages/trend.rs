@@ -139,10 +139,18 @@ fn plot(name: &str, runs: &[&Run], values: &[Option<f64>], steps: &[Option<Strin
     let low = known.iter().copied().fold(f64::INFINITY, f64::min);
     let high = known.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     // A constant figure is a line in the middle, and small changes of a figure look small.
-    let margin = (0.08 * (high - low))
-        .max(0.05 * high.abs().max(low.abs()))
-        .max(f64::MIN_POSITIVE);
-    let (floor, ceiling) = (low - margin, high + margin);
+    let margin = match (0.08 * (high - low)).max(0.05 * high.abs().max(low.abs())) {
+        margin if margin > 0.0 => margin,
+        // Of zeros.
+        _ => 1.0,
+    };
+    // Sizes have no negative values.
+    let floor = if low >= 0.0 {
+        (low - margin).max(0.0)
+    } else {
+        low - margin
+    };
+    let ceiling = high + margin;
     let x = |k: usize| LEFT + (k as f64 + 0.5) / runs.len() as f64 * (WIDTH - LEFT - RIGHT);
     let y = |value: f64| TOP + (ceiling - value) / (ceiling - floor) * (HEIGHT - TOP - BOTTOM);
     let points: Vec<(usize, f64)> = values
