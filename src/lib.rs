@@ -13,8 +13,8 @@ pub mod worker;
 
 pub use areograph_base::{
     altimetry, body, column, constants, error, footprints, frames, image, instruments,
-    kernel_names, kernel_source, line_times, minus, schema, stored, terms, ties, time, units, utc,
-    verdict, watch,
+    kernel_names, kernel_source, line_times, minus, schema, stored, style, terms, ties, time,
+    units, utc, verdict, watch,
 };
 pub use areograph_config as config;
 pub use areograph_fetch as fetch;

@@ -160,7 +160,7 @@ fn products_that_contradict_the_manifest_are_refused() {
         let bytes = &product["bytes"];
         format!(
             "exit 3\nerror: aside/case/{path}: {found}; expected {bytes} bytes with the BLAKE3 hash {hash}, \
-             as in manifest.json\n  what to do: run the site again: damaged products are rewritten\n"
+             as in manifest.json\n  what to do: run areograph again on the configuration file of these products: damaged products are rewritten\n"
         )
     };
     case.write("aside/case/footprints.parquet", "mine");

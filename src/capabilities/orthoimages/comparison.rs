@@ -16,27 +16,15 @@ use crate::{
     },
     stage::Round,
     stages::mosaic_images::{MosaicAccount, MosaicDetail},
+    style::IMAGE_COLOURS,
     units::METRES_PER_KM,
 };
 
 /// Indices of colours of offsets before and after.
 const BEFORE: usize = 1;
 const AFTER: usize = 0;
-/// Rows at the upper and lower edge of a detail on which the images are marked, and the colours of the marks.
+/// Rows at the upper and lower edge of a detail on which the images are marked.
 const MARKED: usize = 8;
-/// Tol 2021, *Colour schemes*, "muted": distinct for colour-blind readers; and black.
-const MARKS: [(&str, [u8; 3]); 10] = [
-    ("sand", [221, 204, 119]),
-    ("indigo", [51, 34, 136]),
-    ("cyan", [136, 204, 238]),
-    ("wine", [136, 34, 85]),
-    ("green", [17, 119, 51]),
-    ("rose", [204, 102, 119]),
-    ("teal", [68, 170, 153]),
-    ("purple", [170, 68, 153]),
-    ("olive", [153, 153, 51]),
-    ("black", [0, 0, 0]),
-];
 
 /// Offsets of every pair: a sentence, a table and a map; empty without overlapping orthoimages.
 pub(super) fn compared(site: &SiteProducts) -> Result<Markup> {
@@ -256,7 +244,7 @@ fn detail(site: &SiteProducts, state: &str, name: &str, account: &MosaicAccount)
     let picture = picture_of(&marked(of), of.size, &alt)?;
     let edges = numbers(of).map(|at| {
         let id = &site.images[account.images[at].image].times.id;
-        format!("{}: {id}", MARKS[at % MARKS.len()].0)
+        format!("{}: {id}", IMAGE_COLOURS[at % IMAGE_COLOURS.len()].0)
     });
     let edges: Vec<String> = edges.collect();
     Ok(html! {
@@ -286,7 +274,7 @@ fn marked(detail: &MosaicDetail) -> Vec<u8> {
         let row = at / columns.max(1);
         let source = detail.sources[at];
         if source > 0 && (row < MARKED || row + MARKED >= rows) {
-            let (_, colour) = MARKS[usize::from(source - 1) % MARKS.len()];
+            let (_, colour) = IMAGE_COLOURS[usize::from(source - 1) % IMAGE_COLOURS.len()];
             pixel[..3].copy_from_slice(&colour);
         }
     }

@@ -1,6 +1,6 @@
 //! The document of a QGIS project (`.qgs`, the layout of version 3.22), with the elements that `QgsProject::read` needs.
 
-use areograph_base::minus::with_minus;
+use areograph_base::{minus::with_minus, style::IMAGE_COLOURS};
 use maud::{Markup, html};
 
 use super::map::Map;
@@ -14,16 +14,6 @@ const COLOURS: [&str; 5] = [
     "33,145,140,255",
     "94,201,98,255",
     "253,231,37,255",
-];
-/// Colours of images: a qualitative scale for any colour vision (Okabe and Ito 2008).
-const SOURCES: [&str; 7] = [
-    "230,159,0,255",
-    "86,180,233,255",
-    "0,158,115,255",
-    "240,228,66,255",
-    "0,114,178,255",
-    "213,94,0,255",
-    "204,121,167,255",
 ];
 /// Beginning of the identifiers of layers; QGIS replaces those of up to ten letters.
 const ID: &str = "areograph_layer_";
@@ -338,8 +328,9 @@ fn raster_style(form: &Form) -> Markup {
             rasterrenderer type="paletted" band="1" opacity="1" alphaBand="-1" {
                 colorPalette {
                     @for (index, image) in images.iter().enumerate() {
-                        @let colour = SOURCES[index % SOURCES.len()];
-                        paletteEntry value=(index + 1) color=(hexadecimal(colour)) alpha="255" label=(image) {}
+                        @let (_, [red, green, blue]) = IMAGE_COLOURS[index % IMAGE_COLOURS.len()];
+                        @let colour = format!("#{red:02x}{green:02x}{blue:02x}");
+                        paletteEntry value=(index + 1) color=(colour) alpha="255" label=(image) {}
                     }
                 }
             }
