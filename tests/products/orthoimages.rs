@@ -230,7 +230,7 @@ fn rasters_are_layers_of_the_project(project: &Path, id: &str) {
     // The colours of the images have their names, and the mosaic is shown in place of the orthoimage.
     let palette = text.split("type=\"paletted\"").nth(1).unwrap();
     let entry =
-        format!("<paletteEntry value=\"1\" color=\"#e69f00\" alpha=\"255\" label=\"{id}\">");
+        format!("<paletteEntry value=\"1\" color=\"#ddcc77\" alpha=\"255\" label=\"{id}\">");
     assert!(
         palette.split("</pipe>").next().unwrap().contains(&entry),
         "{palette}"

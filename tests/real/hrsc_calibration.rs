@@ -380,6 +380,7 @@ fn refused(case: &Case, isd: &[String; 2]) {
     };
     let printed = to("out/h5270/cameras/s1");
     assert!(printed.contains("in the products of a run"), "{printed}");
+    fs::create_dir(case.path("own")).unwrap();
     case.write(&format!("own/{}.json", name(&LINES[0])), "{}");
     let printed = to("own");
     let expected = "exists, and is not calibrated support data";
