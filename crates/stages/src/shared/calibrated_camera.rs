@@ -84,7 +84,7 @@ pub(crate) fn calibrated_camera<'a>(
         let Some(of) = found.calibration.clone() else {
             return Err(ForeignCalibration::NotCalibrated).in_file(file);
         };
-        if !support.platform.eq_ignore_ascii_case(platform) {
+        if plain(&support.platform) != plain(platform) {
             continue;
         }
         if found.name != sensor {
@@ -135,6 +135,11 @@ pub(crate) fn calibrated_camera<'a>(
         known: others.join(", "),
     }
     .into())
+}
+
+/// A name of a spacecraft without differences between programs.
+fn plain(name: &str) -> String {
+    name.replace('_', " ").to_ascii_uppercase()
 }
 
 /// Largest angle between the look directions of two cameras in the frame of the bus, radians.
