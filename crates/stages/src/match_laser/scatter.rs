@@ -190,6 +190,7 @@ mod tests {
                     }),
                 }),
                 held_out: None,
+                concordance: [None; 2],
                 similarity: None,
                 refused_because: String::new(),
             }
