@@ -643,10 +643,16 @@ fn mapped(site: &Table) -> Table {
 }
 
 /// Keys whose change is no change of a site, and why.
-const NO_CHANGE: [(&str, &str); 1] = [(
-    "site",
-    "products of another identifier are those of another site, and stay beside the first ones",
-)];
+const NO_CHANGE: [(&str, &str); 2] = [
+    (
+        "site",
+        "products of another identifier are those of another site, and stay beside the first ones",
+    ),
+    (
+        "calibration.from",
+        "no calibration of a camera of these sites; `tests/real/hrsc_calibration.rs` has one",
+    ),
+];
 
 /// The sites with another value of `key` that a site file may have.
 fn accepted(walk: &Walk, site: &Table, key: &DeclaredKey) -> Vec<Table> {
