@@ -337,7 +337,15 @@ const DAMAGES: [Damage; 16] = [
     (
         "a distortion that nobody here knows",
         |isd| isd["optical_distortion"] = json!({"kaguyalism": {"x": [0.0], "y": [0.0]}}),
-        "expected one of the supported distortions radial and lrolrocnac",
+        "expected one of the supported distortions radial, transverse and lrolrocnac",
+    ),
+    (
+        "a distortion that lacks a coefficient",
+        |isd| {
+            let nine = vec![0.0; 9];
+            isd["optical_distortion"] = json!({"transverse": {"x": nine, "y": nine}});
+        },
+        "optical_distortion.transverse.x is [0.0,0.0,0.0,0.0,0.0,0.0,0.0,0.0,0.0]; expected 10 finite numbers",
     ),
     (
         "no lines between pixels",
