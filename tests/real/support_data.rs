@@ -267,7 +267,7 @@ fn images_of_support_data_need_leap_seconds_alone() {
 /// A change of good support data, and what the message must hold.
 type Damage = (&'static str, fn(&mut Value), &'static str);
 
-const DAMAGES: [Damage; 16] = [
+const DAMAGES: [Damage; 17] = [
     (
         "another kind of camera",
         |isd| isd["name_model"] = json!("USGS_ASTRO_FRAME_SENSOR_MODEL"),
