@@ -331,6 +331,13 @@ fn used_by_a_site(case: &Case) {
     let mut run = case.areograph();
     run.args(["run", "with.toml", "--out", "out"]);
     succeed(&mut run);
+    // Mounting and orbit of the calibrated images are not separated: positions in other orbits are less accurate than stated.
+    let verdict = &json(&case.path("out/with/manifest.json"))["verdict"];
+    let expected = "contain the mean error of the calibrated orbit, which the stated standard deviations do not include";
+    assert!(
+        verdict["remarks"].to_string().contains(expected),
+        "{verdict}"
+    );
     for line in &LINES {
         let own = case.path(&format!("out/with/images/{}/isd.json", name(line)));
         assert_eq!(json(&own)["areograph_calibration"]["calibration"], "h5270");

@@ -269,7 +269,7 @@ fn image_times(
 ) -> Result<ImageTimes> {
     let (mut notes, mut remarks) = (Vec::new(), Vec::new());
     let (instrument, label) = labelled(image)?;
-    let instrument = calibrated(instrument, calibration, &mut notes)?;
+    let instrument = calibrated(instrument, calibration, (&mut notes, &mut remarks))?;
     let session = &session.of(instrument.spacecraft);
     let utc_stop = label.as_ref().and_then(|label| label.utc_stop.clone());
     let tells_lines = label.is_some() && !instrument.spacecraft.labels_tell_clock;

@@ -96,11 +96,11 @@ pub(super) fn labelled(image: &ImageConfig) -> Result<(Instrument, Option<ImageL
     Ok((label.instrument.clone(), Some(label)))
 }
 
-/// The camera by its calibration among `files`, with a note; unchanged where none applies.
+/// The camera by its calibration among `files`, with a note and a remark; unchanged where none applies.
 pub(super) fn calibrated(
     camera: Instrument,
     files: &[HashedFile],
-    notes: &mut Vec<String>,
+    (notes, remarks): (&mut Vec<String>, &mut Vec<Disagreement>),
 ) -> Result<Instrument> {
     let names = [&*camera.spacecraft.label_name, camera.sensor_name()];
     let paths = files.iter().map(|file| &*file.path);
@@ -108,6 +108,11 @@ pub(super) fn calibrated(
         return Ok(camera);
     };
     notes.extend(found.camera.calibration.as_ref().map(calibrated_note));
+    remarks.push(Disagreement::from(format!(
+        "the offset angles of the calibration {} contain the mean error of the calibrated orbit, which the stated standard \
+         deviations do not include",
+        found.calibration
+    )));
     Ok(found.camera)
 }
 
