@@ -6,7 +6,7 @@ mod tables;
 
 use std::{
     fs,
-    path::{Component, Path, PathBuf},
+    path::{Path, PathBuf},
 };
 
 use clap::Args;
@@ -17,7 +17,9 @@ use super::{
     windows::{BOX, BoxMeaning, edges},
 };
 use crate::{
-    config::{Document as _, SITE_IDENTIFIER, SiteConfig, built_in_instruments},
+    config::{
+        Document as _, SITE_IDENTIFIER, SiteConfig, absolute, built_in_instruments, seen_from,
+    },
     error::{Cause, Error, IoError, Locate as _},
     files::file_name,
     pds::{product_named, read_label},
@@ -156,39 +158,6 @@ fn identifier(name: &str) -> String {
     letters.collect()
 }
 
-fn absolute(path: &Path) -> Result<PathBuf, Error> {
-    let path = std::path::absolute(path)
-        .map_err(IoError::on("find"))
-        .in_file(path)?;
-    // Parent components are resolved here: after a wildcard or before a folder exists, they lead nowhere.
-    let mut steps = PathBuf::new();
-    for step in path.components() {
-        match step {
-            Component::ParentDir => {
-                steps.pop();
-            }
-            step => steps.push(step),
-        }
-    }
-    Ok(steps)
-}
-
-/// `path` relative to `folder`, both absolute; unchanged if they share only the root.
-fn seen_from(folder: &Path, path: &Path) -> PathBuf {
-    let (here, there): (Vec<Component>, Vec<Component>) =
-        (folder.components().collect(), path.components().collect());
-    let common = here
-        .iter()
-        .zip(&there)
-        .take_while(|(one, other)| one == other)
-        .count();
-    if common <= 1 {
-        return path.to_owned();
-    }
-    let back = here[common..].iter().map(|_| Component::ParentDir);
-    back.chain(there[common..].iter().copied()).collect()
-}
-
 /// Paths given relative to the current folder, relative to `folder`.
 fn seen(folder: &Path, paths: &[PathBuf]) -> Result<Vec<PathBuf>, Error> {
     let paths = paths
@@ -200,22 +169,6 @@ fn seen(folder: &Path, paths: &[PathBuf]) -> Result<Vec<PathBuf>, Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn paths_are_seen_from_the_folder_of_the_file() {
-        let seen = |folder: &str, path: &str| seen_from(Path::new(folder), Path::new(path));
-        assert_eq!(
-            seen("/home/a/sites", "/home/a/pedr/*.b"),
-            Path::new("../pedr/*.b")
-        );
-        assert_eq!(seen("/home/a", "/home/a/k.tm"), Path::new("k.tm"));
-        assert_eq!(seen("/home/a/b/c", "/home/d"), Path::new("../../../d"));
-        assert_eq!(seen("/home/a", "/data/mola"), Path::new("/data/mola"));
-        assert_eq!(
-            absolute(Path::new("/a/b/../c/./d")).unwrap(),
-            Path::new("/a/c/d")
-        );
-    }
 
     #[test]
     fn names_become_identifiers() {

@@ -1,6 +1,7 @@
 //! The command line: one file per command, no geometry.
 
 mod calibrate;
+mod campaign;
 mod check;
 mod compare_readings;
 mod completions;
@@ -18,6 +19,7 @@ mod output;
 mod panicked;
 mod pedr;
 mod plan;
+mod pool;
 mod progress;
 mod report;
 mod run;
@@ -110,6 +112,7 @@ enum Command {
     Export(export::Arguments),
     Triangulate(triangulate::Arguments),
     Calibrate(calibrate::Arguments),
+    Campaign(campaign::Arguments),
     Scene(scene::Arguments),
     Serve(serve::Arguments),
     Nightly(nightly::Arguments),
@@ -120,6 +123,8 @@ enum Command {
     Man(man::Arguments),
     #[command(hide = true)]
     Worker(worker::Arguments),
+    #[command(hide = true)]
+    CampaignTask(campaign::TaskArguments),
 }
 
 /// Parses the command line, runs the command and reports failures on standard error.
@@ -151,7 +156,7 @@ pub fn main_of(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>)
 fn log(cli: &Cli) {
     // The log is the only account of an unattended command.
     let unattended = match &cli.command {
-        Command::Worker(_) | Command::Nightly(_) => true,
+        Command::Worker(_) | Command::CampaignTask(_) | Command::Nightly(_) => true,
         Command::Serve(arguments) => arguments.init.is_none(),
         _ => false,
     };
@@ -197,6 +202,7 @@ fn run(command: Command) -> ExitCode {
         Command::Export(arguments) => finish(export::run(&arguments)),
         Command::Triangulate(arguments) => triangulate::run(&arguments),
         Command::Calibrate(arguments) => calibrate::run(&arguments),
+        Command::Campaign(arguments) => campaign::run(&arguments),
         Command::Scene(arguments) => finish(scene::run(&arguments)),
         Command::Serve(arguments) => serve::run(&arguments),
         Command::Nightly(arguments) => nightly::run(&arguments),
@@ -207,6 +213,7 @@ fn run(command: Command) -> ExitCode {
         }
         Command::Man(arguments) => finish(man::run(&arguments)),
         Command::Worker(arguments) => worker::run(&arguments),
+        Command::CampaignTask(arguments) => campaign::run_task(&arguments),
     }
 }
 
@@ -244,7 +251,11 @@ struct NoSite {
 
 /// Refuses files of other flows by their kind; loading reports all other faults.
 fn site_file(path: &Path) -> Result<(), Error> {
-    for (what, command) in [("net", "triangulate"), ("calibration", "calibrate")] {
+    for (what, command) in [
+        ("net", "triangulate"),
+        ("calibration", "calibrate"),
+        ("campaign", "campaign"),
+    ] {
         if plan::has_key(path, what) && !plan::has_key(path, "site") {
             return Err(NoSite { what, command }).in_file(path);
         }
@@ -286,7 +297,8 @@ mod tests {
         if !help.contains("Example") {
             found.push(named.to_owned());
         }
-        let own = |command: &&mut clap::Command| !["worker", "help"].contains(&command.get_name());
+        let hidden = ["worker", "campaign-task", "help"];
+        let own = |command: &&mut clap::Command| !hidden.contains(&command.get_name());
         for command in command.get_subcommands_mut().filter(own) {
             let named = format!("{named} {}", command.get_name());
             without_example(command, &named, found);

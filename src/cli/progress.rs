@@ -219,7 +219,7 @@ struct Counted {
 
 impl Progress {
     /// Reports the progress of a stage; called from any thread.
-    fn count(&self, stage: &str, count: Count) {
+    pub(super) fn count(&self, stage: &str, count: Count) {
         let mut counted = self.counted.lock().unwrap_or_else(PoisonError::into_inner);
         // Files are hashed for a stage before it counts its steps.
         let same = |before: &Counted| before.stage == stage && before.of == count.of;

@@ -8,16 +8,13 @@ use std::{
 
 use clap::{Args, builder::PossibleValuesParser};
 use serde_json::json;
-use tokio::{sync::Semaphore, task::JoinHandle};
 
 use super::{
-    load_sites, open, output,
-    panicked::flatten,
-    plan,
+    load_sites, open, output, plan,
+    pool::{in_pool, limit_threads},
     progress::Progress,
     report,
     single::{RunFlags, stopped_after, untested},
-    stop::on_signals,
 };
 use crate::{
     config::SiteConfig,
@@ -105,17 +102,11 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
         let tasks: Vec<Task<'_>> = sites.iter().map(Task::Site).collect();
         return super::finish(plan::print(&tasks, &options, arguments.flags.json));
     }
-    if let Some(threads) = arguments.threads {
-        // The only failure is an existing pool, which keeps its size.
-        let _ = rayon::ThreadPoolBuilder::new()
-            .num_threads(usize::from(threads))
-            .build_global();
-    }
-    let runtime = match tokio::runtime::Runtime::new() {
-        Ok(runtime) => runtime,
-        Err(error) => return report(&crate::error::IoError::on("start threads")(error).into()),
+    limit_threads(arguments.threads);
+    let outcomes = match run_all(sites, arguments, &hashes) {
+        Ok(outcomes) => outcomes,
+        Err(failure) => return report(&failure),
     };
-    let outcomes = runtime.block_on(run_all(sites, arguments, &hashes));
     print(&outcomes, arguments.flags.json);
     // If the folder could not be created, the run has already reported it.
     let page = arguments
@@ -151,35 +142,25 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
 type Outcome = Result<RunOutcome, Error>;
 
 /// Runs at most `jobs` sites at a time; after a signal each finishes its stage, or leaves a long one, and stops.
-async fn run_all(
+fn run_all(
     sites: Vec<SiteConfig>,
     arguments: &Arguments,
     hashes: &HashCache,
-) -> Vec<Outcome> {
+) -> Result<Vec<Outcome>, Error> {
     let stop = Arc::new(AtomicBool::new(false));
-    let places = Arc::new(Semaphore::new(usize::from(arguments.jobs)));
-    let handles: Vec<JoinHandle<Outcome>> = sites
-        .into_iter()
-        .map(|site| {
-            let (stop, places) = (Arc::clone(&stop), Arc::clone(&places));
-            let (arguments, hashes) = (arguments.clone(), hashes.clone());
-            tokio::spawn(async move {
-                let _place = places.acquire_owned().await;
-                let work = move || {
-                    let progress = Progress::of(Task::Site(&site));
-                    run_site(&site, &arguments.options(&stop, &hashes, &progress))
-                };
-                flatten(tokio::task::spawn_blocking(work).await)
-            })
-        })
-        .collect();
-    let told = tokio::spawn(async move { on_signals(&stop).await });
-    let mut outcomes = Vec::with_capacity(handles.len());
-    for handle in handles {
-        outcomes.push(flatten(handle.await));
-    }
-    told.abort();
-    outcomes
+    let mut outcomes: Vec<Option<Outcome>> = sites.iter().map(|_| None).collect();
+    let work = sites.into_iter().map(|site| {
+        let stop = Arc::clone(&stop);
+        let (arguments, hashes) = (arguments.clone(), hashes.clone());
+        move || {
+            let progress = Progress::of(Task::Site(&site));
+            run_site(&site, &arguments.options(&stop, &hashes, &progress))
+        }
+    });
+    in_pool(arguments.jobs, &stop, work, |number, outcome| {
+        outcomes[number] = Some(outcome);
+    })?;
+    Ok(outcomes.into_iter().flatten().collect())
 }
 
 fn exit_code(outcome: &Outcome) -> u8 {

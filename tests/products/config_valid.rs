@@ -15,7 +15,7 @@ use std::{
 
 use areograph::{
     config::{
-        self, CalibrationConfig, Document, Loaded, NetConfig, ServiceConfig, SiteConfig, ValueKind,
+        self, CalibrationConfig, CampaignConfig, Document, Loaded, NetConfig, ServiceConfig, SiteConfig, ValueKind,
     },
     geom::window::WindowShape,
 };
@@ -328,6 +328,7 @@ fn example_and_schema_are_made_from_the_declarations() {
     made_from_declarations::<SiteConfig>("site");
     made_from_declarations::<NetConfig>("net");
     made_from_declarations::<CalibrationConfig>("calibration");
+    made_from_declarations::<CampaignConfig>("campaign");
     made_from_declarations::<ServiceConfig>("service");
 }
 

@@ -20,6 +20,7 @@
 mod adjustment;
 mod calibration;
 mod cameras;
+mod campaign;
 mod data_file;
 mod declare;
 mod document;
@@ -62,6 +63,10 @@ pub use calibration::{
     SolutionConfig, ValidationConfig,
 };
 pub use cameras::CamerasConfig;
+pub use campaign::{
+    CampaignArchiveConfig, CampaignConfig, CampaignImage, CampaignPairsConfig, ExecutorConfig,
+    ExecutorKind, SITE_FILE_MARK, SelectionConfig, SiteTemplate, load_campaign,
+};
 pub use declare::{Accept, DeclaredKey, ValueKind, Word};
 pub use document::{Document, Loaded};
 pub use exposures::{ExposurePiece, line_times_of};
@@ -77,7 +82,10 @@ pub use limits::LimitsConfig;
 pub use net::{Blunders, Method, NetConfig, TriangulationConfig, YAxis};
 pub use new_site::NewSite;
 pub use orientation::{OrientationConfig, RegistrationConfig};
-pub use paths::{DEPTH_MAX, PEDR_ENDINGS, SHOT_TABLE_ENDINGS, TIE_ENDINGS, files_in};
+pub use paths::{
+    DEPTH_MAX, PEDR_ENDINGS, SHOT_TABLE_ENDINGS, TIE_ENDINGS, absolute, files_in, seen_from,
+    without_parents,
+};
 pub use pedr::PedrConfig;
 pub use pointing::{PointingConfig, UsedBias};
 pub use problems::Problems;

@@ -3,9 +3,10 @@
 use std::{
     collections::BTreeMap,
     fmt, fs, io,
-    path::{Path, PathBuf},
+    path::{Component, Path, PathBuf},
 };
 
+use areograph_base::error::{Error, IoError, Locate as _};
 use rustix::fs::{Access, access};
 use toml::Value;
 
@@ -312,4 +313,68 @@ pub fn files_in(folder: &Path, endings: &[&str], depth: usize) -> io::Result<Vec
     }
     files.sort();
     Ok(files)
+}
+
+/// An absolute path without `.` and `..`, which lead nowhere after a wildcard or before a folder exists.
+///
+/// # Errors
+/// The current folder cannot be found.
+pub fn absolute(path: &Path) -> Result<PathBuf, Error> {
+    let path = std::path::absolute(path)
+        .map_err(IoError::on("find"))
+        .in_file(path)?;
+    Ok(without_parents(&path))
+}
+
+/// An absolute path without `.` and `..`, links not followed.
+#[must_use]
+pub fn without_parents(path: &Path) -> PathBuf {
+    let mut steps = PathBuf::new();
+    for step in path.components() {
+        match step {
+            Component::ParentDir => {
+                steps.pop();
+            }
+            step => steps.push(step),
+        }
+    }
+    steps
+}
+
+/// `path` relative to `folder`, both absolute; unchanged if they share only the root.
+#[must_use]
+pub fn seen_from(folder: &Path, path: &Path) -> PathBuf {
+    let (here, there): (Vec<Component>, Vec<Component>) =
+        (folder.components().collect(), path.components().collect());
+    let common = here
+        .iter()
+        .zip(&there)
+        .take_while(|(one, other)| one == other)
+        .count();
+    if common <= 1 {
+        return path.to_owned();
+    }
+    let back = here[common..].iter().map(|_| Component::ParentDir);
+    back.chain(there[common..].iter().copied()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paths_are_seen_from_the_folder_of_the_file() {
+        let seen = |folder: &str, path: &str| seen_from(Path::new(folder), Path::new(path));
+        assert_eq!(
+            seen("/home/a/sites", "/home/a/pedr/*.b"),
+            Path::new("../pedr/*.b")
+        );
+        assert_eq!(seen("/home/a", "/home/a/k.tm"), Path::new("k.tm"));
+        assert_eq!(seen("/home/a/b/c", "/home/d"), Path::new("../../../d"));
+        assert_eq!(seen("/home/a", "/data/mola"), Path::new("/data/mola"));
+        assert_eq!(
+            absolute(Path::new("/a/b/../c/./d")).unwrap(),
+            Path::new("/a/c/d")
+        );
+    }
 }

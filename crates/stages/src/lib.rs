@@ -36,6 +36,7 @@ pub mod register;
 pub mod reorient;
 pub mod sample_orientation;
 pub mod search_footprints;
+pub mod select_images;
 mod shared;
 pub mod tabulate_kernels;
 pub mod tag_times;

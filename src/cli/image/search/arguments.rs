@@ -8,8 +8,8 @@ use crate::{
     cli::{numbers::above_to, windows::WindowArguments},
     config::{Document as _, SiteConfig, WindowConfig, built_in_instruments, require_outlines},
     error::{Cause, Locate as _, Result},
-    instruments::Instrument,
     pds::image_index::IndexedImage,
+    stages::select_images::cameras_of,
     units::RADIANS_PER_DEGREE,
 };
 
@@ -80,23 +80,6 @@ fn known_cameras() -> String {
         .map(|camera| &*camera.id)
         .collect();
     ids.join(", ")
-}
-
-/// The cameras that may have taken an image, by the names in the index; several if names are missing.
-pub(super) fn cameras_of(image: &IndexedImage) -> impl Iterator<Item = &'static Instrument> + '_ {
-    let [instrument, filter] = &image.instrument;
-    let may_be = |own: &str, found: &str| found.is_empty() || own == found;
-    built_in_instruments().iter().filter(move |camera| {
-        let own_filter = camera.label.filter.as_deref();
-        may_be(&camera.label.instrument, instrument)
-            && own_filter.is_none_or(|own| may_be(own, filter))
-    })
-}
-
-/// The camera of an image, if the index identifies it.
-pub(super) fn camera_of(image: &IndexedImage) -> Option<&'static Instrument> {
-    let mut cameras = cameras_of(image);
-    cameras.next().filter(|_| cameras.next().is_none())
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

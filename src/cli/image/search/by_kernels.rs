@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use super::{Found, RADIUS_M, arguments::camera_of};
 use crate::{
     config::{ImageConfig, KernelsConfig, OrientationConfig, PointingConfig},
     error::{Kind, Result},
@@ -13,7 +12,11 @@ use crate::{
     image::ImageFields,
     pds::image_index::IndexedImage,
     spice::{KernelSet, Session},
-    stages::{sample_orientation::sample_orientation, tag_times::tag_times},
+    stages::{
+        sample_orientation::sample_orientation,
+        select_images::{Found, RADIUS_M, camera_of, identifier},
+        tag_times::tag_times,
+    },
     units::METRES_PER_KM,
 };
 
@@ -100,7 +103,7 @@ fn entry(image: &IndexedImage) -> ImageConfig {
     let [crosstrack_summing, downtrack_summing] = image.summing;
     let [samples, lines] = image.size;
     ImageConfig {
-        id: image.product_id.replace('/', "-"),
+        id: identifier(image),
         instrument: camera_of(image).cloned(),
         fields: ImageFields {
             sclk_start: image.sclk_start.clone(),

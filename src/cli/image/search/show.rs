@@ -2,9 +2,9 @@
 
 use serde_json::{Value, json};
 
-use super::{Found, Pair, arguments::camera_of};
 use crate::{
     cli::output,
+    stages::select_images::{Found, Pair, camera_of, identifier},
     units::{METRES_PER_KM, RADIANS_PER_DEGREE, SECONDS_PER_MS},
 };
 
@@ -28,7 +28,7 @@ fn count(value: Option<u32>) -> String {
 
 /// Identifier as in site files.
 fn id(found: &Found) -> String {
-    found.image.product_id.replace('/', "-")
+    identifier(&found.image)
 }
 
 /// Heading and value of a column.

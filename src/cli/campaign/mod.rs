@@ -1,0 +1,166 @@
+//! `areograph campaign`.
+
+mod answer;
+mod slurm;
+mod task;
+
+use std::{
+    collections::BTreeSet,
+    path::PathBuf,
+    process::ExitCode,
+    sync::{Arc, atomic::AtomicBool},
+};
+
+use clap::Args;
+
+pub(super) use self::task::{Arguments as TaskArguments, run as run_task};
+use super::{
+    pool::{in_pool, limit_threads},
+    progress::Progress,
+    report,
+};
+use crate::{
+    config::ExecutorKind,
+    error::{Cause, Locate as _, Result},
+    flow::{Campaign, Costs, RunOptions, SiteEnd, check_out, run_site_file, select_campaign},
+    service::words::counted,
+    store::hashes::HashCache,
+    watch::Count,
+};
+
+/// Processes images and pairs of an index, selected by rule, as sites.
+///
+/// Every pair or image becomes a site file in OUT/sites, which is run as `areograph run` runs it: a repeated command runs the
+/// stages affected by a change, and continues after an interruption.
+///
+/// Examples:
+///   areograph campaign tharsis.toml --out products --plan
+///   areograph campaign tharsis.toml --out products --jobs 8
+#[derive(Debug, Clone, Args)]
+#[command(verbatim_doc_comment)]
+pub(super) struct Arguments {
+    /// Campaign file (TOML).
+    #[arg(value_name = "CAMPAIGN.toml")]
+    file: PathBuf,
+    /// Output folder; each site is written to a subfolder.
+    #[arg(long, default_value = "out")]
+    out: PathBuf,
+    /// State what the rules select and what it costs; run no site.
+    #[arg(long)]
+    plan: bool,
+    /// Only these sites.
+    #[arg(long, value_name = "SITE", num_args = 1..)]
+    only: Vec<String>,
+    /// Number of sites that run at the same time on this machine (SPICE itself serves one at a time).
+    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u16).range(1..=64))]
+    jobs: u16,
+    /// Worker threads; by default one per core. Products do not depend on it.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+    /// Read all input files, stored outputs and products again, even if unchanged.
+    #[arg(long)]
+    rehash: bool,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Reasons why no site runs.
+#[derive(Debug, thiserror::Error, Cause)]
+enum NotRun {
+    #[error("the campaign has no site {0:?}")]
+    #[cause(Configuration: "list its sites with --plan --json, or omit --only")]
+    Unknown(String),
+    #[error("the rules select no image of {0}")]
+    #[cause(Configuration: "relax [select] or [[windows]]")]
+    NoImage(String),
+    #[error("the rules select {0}, but no pair of them")]
+    #[cause(Configuration: "relax [pairs], or set pairs.singles = true")]
+    NoPair(String),
+}
+
+pub(super) fn run(arguments: &Arguments) -> ExitCode {
+    match ran(arguments) {
+        Ok(code) => code,
+        Err(failure) => report(&failure),
+    }
+}
+
+fn ran(arguments: &Arguments) -> Result<ExitCode> {
+    let mut campaign = select_campaign(&arguments.file)?;
+    for remark in &campaign.remarks {
+        tracing::warn!("{remark}");
+    }
+    is_selected(&campaign, arguments).in_file(&arguments.file)?;
+    if arguments.plan {
+        let costs = Costs::read(&arguments.out);
+        answer::plan(&campaign, costs, arguments.jobs, arguments.json);
+        return Ok(ExitCode::SUCCESS);
+    }
+    check_out(&arguments.out, &[])?;
+    limit_threads(arguments.threads);
+    if arguments.only.is_empty() {
+        for stale in campaign.remove_stale_site_files(&arguments.out)? {
+            tracing::info!("{stale}: no longer a site of the campaign; its products remain");
+        }
+    } else {
+        let only: BTreeSet<&String> = arguments.only.iter().collect();
+        campaign.sites.retain(|site| only.contains(&site.id));
+    }
+    let campaign = Arc::new(campaign);
+    let ended = match campaign.config.executor.kind {
+        ExecutorKind::Local => on_this_machine(&campaign, arguments)?,
+        ExecutorKind::Slurm => slurm::run_sites(&campaign, &arguments.out)?,
+    };
+    let mut costs = Costs::default();
+    ended
+        .iter()
+        .filter_map(SiteEnd::costs)
+        .for_each(|of_site| costs.add(of_site));
+    if costs.images > 0 {
+        costs.keep(&arguments.out)?;
+    }
+    Ok(answer::ended(&campaign, &ended, arguments.json))
+}
+
+/// Refuses a campaign without sites, and unknown sites.
+fn is_selected(campaign: &Campaign, arguments: &Arguments) -> std::result::Result<(), NotRun> {
+    let is_site = |id: &&String| campaign.sites.iter().any(|site| site.id == **id);
+    if let Some(unknown) = arguments.only.iter().find(|id| !is_site(id)) {
+        return Err(NotRun::Unknown(unknown.clone()));
+    }
+    if campaign.images.is_empty() {
+        return Err(NotRun::NoImage(counted(campaign.excluded, "image")));
+    }
+    if campaign.sites.is_empty() && campaign.left_out.is_empty() {
+        return Err(NotRun::NoPair(counted(campaign.images.len(), "image")));
+    }
+    Ok(())
+}
+
+/// Runs the sites on this machine; they are returned in their order.
+fn on_this_machine(campaign: &Arc<Campaign>, arguments: &Arguments) -> Result<Vec<SiteEnd>> {
+    let hashes = HashCache::in_folder(&arguments.out, arguments.rehash);
+    let stop = Arc::new(AtomicBool::new(false));
+    let all = campaign.sites.len();
+    let work = (0..all).map(|number| {
+        let (campaign, stop) = (Arc::clone(campaign), Arc::clone(&stop));
+        let (hashes, out) = (hashes.clone(), arguments.out.clone());
+        move || {
+            let path = campaign.write_site_file(&campaign.sites[number], &out)?;
+            Ok(run_site_file(&path, &RunOptions::of(&out, &stop, &hashes)))
+        }
+    });
+    let progress = Progress::of_work(&campaign.config.campaign);
+    let mut ended: Vec<Option<SiteEnd>> = (0..all).map(|_| None).collect();
+    let mut done = 0;
+    in_pool(arguments.jobs, &stop, work, |number, result| {
+        done += 1;
+        let of = "sites";
+        let all = all as u64;
+        progress.count("run", Count { done, all, of });
+        let id = &campaign.sites[number].id;
+        ended[number] = Some(result.unwrap_or_else(|failure| SiteEnd::failed(id, &failure)));
+    })?;
+    Ok(ended.into_iter().flatten().collect())
+}
