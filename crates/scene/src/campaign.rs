@@ -101,22 +101,7 @@ pub fn write_campaign(
     options: &CampaignOptions,
     watch: Watch<'_>,
 ) -> Result<CampaignSummary> {
-    let counts = [
-        ("pairs", options.pairs, PAIRS),
-        ("singles", options.singles, SINGLES),
-    ];
-    for (option, count, [least, most]) in counts {
-        let value = f64::from(count);
-        if !(least..=most).contains(&value) {
-            return Err(SceneError::Option {
-                option,
-                value,
-                least,
-                most,
-            }
-            .into());
-        }
-    }
+    check(options)?;
     let [pairs, singles] = [options.pairs, options.singles].map(|count| count as usize);
     let seed = options.seed;
     let draft = Draft::begin(directory, README)?;
@@ -198,6 +183,27 @@ pub fn write_campaign(
     write_as_truth(&draft, &truth)?;
     draft.finish()?;
     Ok(summary)
+}
+
+/// Rejects options that are out of range.
+fn check(options: &CampaignOptions) -> Result<()> {
+    let counts = [
+        ("pairs", options.pairs, PAIRS),
+        ("singles", options.singles, SINGLES),
+    ];
+    for (option, count, [least, most]) in counts {
+        let value = f64::from(count);
+        if !(least..=most).contains(&value) {
+            return Err(SceneError::Option {
+                option,
+                value,
+                least,
+                most,
+            }
+            .into());
+        }
+    }
+    Ok(())
 }
 
 /// A place surveyed: rows of the index and true values of its images, and those of its pair.

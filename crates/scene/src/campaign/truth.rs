@@ -159,7 +159,7 @@ impl<'a> CampaignTruth<'a> {
                 exp([e]x) times the C-kernel matrix, with e = constant + linear x + quadratic x^2 + jitter and x = (et - middle) \
                 / half_image, held beyond -4 and 4. Lines were exposed time_bias_lines later than the label states. \
                 bus_position_m (camera and laser) is added to the orbit gsfc, IAU 2000. The laser points boresight_rad from +Z \
-                of the bus towards its X and Y throughout the mission. east_north_radial_m is the position of the shots in the \
+                of the bus towards its X and Y throughout the mission. tie_noise_px of a pair replaces that of errors.sizes. east_north_radial_m is the position of the shots in the \
                 PEDR file minus their true position.",
             biases: Biases::injected(),
             crossover: Crossover::injected(),
