@@ -8,22 +8,23 @@ use super::{output, progress::Progress};
 use crate::{
     error::Error,
     scene::{
-        ArchiveOptions, Coder, Roughness, SceneErrors, SceneOptions, write_archive,
-        write_calibration_loop_scene, write_calibration_scene, write_plane_scene, write_scene,
-        write_scene_along, write_scene_with_images, write_terrain_model_scene,
+        ArchiveOptions, CampaignOptions, Coder, Roughness, SceneErrors, SceneOptions,
+        write_archive, write_calibration_loop_scene, write_calibration_scene, write_campaign,
+        write_plane_scene, write_scene, write_scene_along, write_scene_with_images,
+        write_terrain_model_scene,
     },
     units::SECONDS_PER_DAY,
     watch::Watch,
 };
 
-/// Writes synthetic input with known truth: a mission, a net, a calibration, a terrain model or an archive.
+/// Writes synthetic input with known truth: a mission, a campaign, a net, a calibration, a terrain model or an archive.
 ///
 /// Example: `areograph scene mission demo && areograph run demo/sites/*.toml --out products`
 #[derive(Debug, Args)]
 #[command(
     verbatim_doc_comment,
     // Errors print the usage alone: it names all scenes.
-    subcommand_value_name = "mission|along|net|calibration|terrain-model|archive"
+    subcommand_value_name = "mission|along|campaign|net|calibration|terrain-model|archive"
 )]
 pub(super) struct Arguments {
     #[command(subcommand)]
@@ -34,6 +35,7 @@ pub(super) struct Arguments {
 enum Command {
     Mission(MissionArguments),
     Along(AlongArguments),
+    Campaign(CampaignArguments),
     Net(NetArguments),
     Calibration(CalibrationArguments),
     TerrainModel(TerrainModelArguments),
@@ -115,6 +117,25 @@ struct AlongArguments {
     /// Labels of images to put into the site file.
     #[arg(long, value_name = "FILE")]
     label: Vec<PathBuf>,
+}
+
+/// Writes a campaign: image pairs and single images of five mission phases, with an index, kernels, PEDR files, labels, tie
+/// points, and the truth behind them.
+///
+/// All images of a phase have the same offset of the attitude's clock, besides their own errors.
+///
+/// Example: areograph scene campaign demo && areograph image search demo/index/cumindex.tab --box 0,360,-90,90
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+struct CampaignArguments {
+    #[command(flatten)]
+    target: Target,
+    /// Pairs of images, the second off nadir, 1 to 200.
+    #[arg(long, value_name = "COUNT", default_value_t = 6, value_parser = clap::value_parser!(u32).range(1..=200))]
+    pairs: u32,
+    /// Images in no pair, 0 to 200.
+    #[arg(long, value_name = "COUNT", default_value_t = 4, value_parser = clap::value_parser!(u32).range(..=200))]
+    singles: u32,
 }
 
 /// Writes a net of rectified pictures for `areograph triangulate`.
@@ -234,6 +255,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     match &arguments.command {
         Command::Mission(arguments) => mission(arguments),
         Command::Along(arguments) => along(arguments),
+        Command::Campaign(arguments) => campaign(arguments),
         Command::Net(NetArguments { target }) => {
             output::line(write_plane_scene(&target.directory, target.seed)?);
             Ok(())
@@ -282,6 +304,17 @@ fn along(arguments: &AlongArguments) -> Result<(), Error> {
     output::line(working(|_| {
         write_scene_along(directory, kernels, label, *seed)
     })?);
+    Ok(())
+}
+
+fn campaign(arguments: &CampaignArguments) -> Result<(), Error> {
+    let Target { directory, seed } = &arguments.target;
+    let options = CampaignOptions {
+        seed: *seed,
+        pairs: arguments.pairs,
+        singles: arguments.singles,
+    };
+    output::line(working(|watch| write_campaign(directory, &options, watch))?);
     Ok(())
 }
 

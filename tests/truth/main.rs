@@ -7,6 +7,7 @@ mod joined_terrain;
 mod matched_ties;
 mod mutations;
 mod orthoimages;
+mod scene_campaign;
 mod scene_errors;
 mod scene_mission;
 mod scene_ties;

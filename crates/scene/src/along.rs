@@ -14,7 +14,7 @@ use super::{
     error_sources::{Relief, SceneErrors},
     files::{Draft, put},
     laser::{FRAME_S, LaserErrors},
-    mission::write_truth,
+    mission::write_as_truth,
     pedr::{PedrRequest, frame_tags, write_pedr},
     profile_shift::ProfileShift,
     sites::{README_ALONG, SiteFile, SiteImage, SiteKernels, Window},
@@ -124,7 +124,7 @@ pub fn write_scene_along(
         &draft.folder("sites")?.join(format!("{id}.toml")),
         &site.to_toml(),
     )?;
-    write_truth(&draft, &truth)?;
+    write_as_truth(&draft, &truth)?;
     draft.finish()?;
     let images = site.images.len();
     Ok(SceneSummary {

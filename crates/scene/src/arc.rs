@@ -52,10 +52,10 @@ pub(super) trait Flight {
 }
 
 /// The flight of one image day according to its kernels.
-#[derive(Debug)]
-pub(super) struct Arc {
+#[derive(Debug, Clone)]
+pub(super) struct Arc<'a> {
     /// The image.
-    pub image: &'static PlannedImage,
+    pub image: &'a PlannedImage<'a>,
     /// Time of its exposure.
     pub exposed: Interval,
     /// Interval that contains the frames of the day's PEDR file.
@@ -66,12 +66,12 @@ pub(super) struct Arc {
     pub attitude: Attitude,
 }
 
-impl Arc {
+impl<'a> Arc<'a> {
     /// The day of `image`, whose first line begins at `start`; its PEDR file holds `duration_s` of frames.
     ///
     /// # Errors
     /// [`SceneError::NoOrbit`].
-    pub(super) fn new(image: &'static PlannedImage, start: Et, duration_s: f64) -> Result<Self> {
+    pub(super) fn new(image: &'a PlannedImage<'a>, start: Et, duration_s: f64) -> Result<Self> {
         let exposed = image.exposed(start);
         let middle = exposed.start.plus(exposed.duration_s() / 2.0);
         let frames = Interval::new(

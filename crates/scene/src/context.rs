@@ -29,7 +29,7 @@ use areograph_geom::{light_time::light_time_s, pushbroom::Pose};
 use areograph_spice::Session;
 
 /// The site of the images.
-pub(super) static CONTEXT_SITE: Site = Site {
+pub(super) static CONTEXT_SITE: Site<'static> = Site {
     id: "gusev_context",
     name: "Gusev crater, wide angle",
     latitude_deg: -14.6,
@@ -109,7 +109,7 @@ pub(super) static CONTEXT_IMAGES: [PlannedContext; 3] = [
 /// A wide-angle image and its flight.
 pub(super) struct ContextImage<'a> {
     plan: &'static PlannedContext,
-    flown: &'a Flown,
+    flown: &'a Flown<'a>,
     camera: &'static Instrument,
     sclk_start: String,
     start: Et,
@@ -120,7 +120,7 @@ impl<'a> ContextImage<'a> {
     ///
     /// # Errors
     /// [`SceneError::NoCamera`] when the program does not know a camera; errors of the clock kernel.
-    pub(super) fn all(days: &'a [Flown], session: &Session) -> Result<Vec<Self>> {
+    pub(super) fn all(days: &'a [Flown<'a>], session: &Session) -> Result<Vec<Self>> {
         let planned = CONTEXT_IMAGES.iter();
         planned
             .map(|plan| {
@@ -172,6 +172,7 @@ impl<'a> ContextImage<'a> {
     pub(super) fn label(&self, session: &Session) -> Result<String> {
         Ok(image_label(&Label {
             id: self.plan.id,
+            mission_phase: "EXTENDED",
             instrument: &self.camera.label.instrument,
             filter: self.camera.label.filter.as_deref(),
             start: &session.et_to_utc(self.start)?,

@@ -138,6 +138,23 @@ fn sinusoids(sizes: &Jitter, random: &mut Random) -> Vec<Sinusoid> {
 }
 
 impl DayErrors {
+    /// No errors.
+    pub(super) fn none() -> Self {
+        Self {
+            time_bias_lines: 0.0,
+            attitude_clock_s: 0.0,
+            bus_position_m: Vector3::zeros(),
+            camera_position_m: Vector3::zeros(),
+            attitude: None,
+            boresight_rad: [0.0; 2],
+            profile_shift: ProfileShift::none(),
+            camera: CameraError {
+                bend_px: 0.0,
+                focal_length_ratio: 1.0,
+            },
+        }
+    }
+
     /// Draws the errors of the day of `arc`.
     pub(super) fn draw(errors: &SceneErrors, arc: &Arc, seed: u64) -> Self {
         let id = arc.image.id;
@@ -195,7 +212,7 @@ impl DayErrors {
 }
 
 /// Radial, along-track and cross-track axes of the orbit at the middle of the image, in IAU 2000.
-fn orbit_axes(arc: &Arc) -> Matrix3<f64> {
+pub(super) fn orbit_axes(arc: &Arc) -> Matrix3<f64> {
     let middle = arc.exposed.start.plus(0.5 * arc.exposed.duration_s());
     let state = arc.orbit.state(middle);
     body_matrix(&MARS_IAU2000, middle) * radial_along_cross(&state.position_m, &state.velocity_m_s)
@@ -203,14 +220,14 @@ fn orbit_axes(arc: &Arc) -> Matrix3<f64> {
 
 /// The true flight of an image day: the arc of the kernels plus the errors.
 #[derive(Debug)]
-pub(super) struct Flown {
+pub(super) struct Flown<'a> {
     /// The arc of the kernels.
-    pub arc: Arc,
+    pub arc: Arc<'a>,
     /// Errors of the kernels.
     pub errors: DayErrors,
 }
 
-impl Flown {
+impl Flown<'_> {
     /// True position of the bus, IAU 2000, metres.
     pub(super) fn bus_position_m(&self, et: Et) -> Vector3<f64> {
         body_matrix(&MARS_IAU2000, et) * self.arc.orbit.state(et).position_m
@@ -248,7 +265,7 @@ impl Flown {
     }
 }
 
-impl Flight for Flown {
+impl Flight for Flown<'_> {
     fn beam(&self, et: Et) -> Result<Beam> {
         let [towards_x, towards_y] = self.errors.boresight_rad;
         let beam = Vector3::new(towards_x, towards_y, 1.0).normalize();
@@ -272,7 +289,7 @@ mod tests {
     use areograph_config::usual_instrument;
     use areograph_geom::light_time::light_time_s;
 
-    fn arc(image: &'static PlannedImage) -> Arc {
+    fn arc(image: &'static PlannedImage) -> Arc<'static> {
         Arc::new(image, Et::from_seconds(3.9e7), 600.0).unwrap()
     }
 

@@ -94,6 +94,13 @@ pub enum SceneError {
         /// Largest value.
         most: f64,
     },
+    /// A campaign with too many images for its places or times.
+    #[error("no room for further {what} of the campaign")]
+    #[cause(like = NoOrbit)]
+    Crowded {
+        /// What is used up.
+        what: &'static str,
+    },
     /// The kernels do not cover a single stretch of 20 s.
     #[error("the kernels contain no interval of {least_s} s or more with both orbit and attitude")]
     #[cause(Coverage: "check that the metakernel loads SPKs of -94 and 499 and a CK of -94000 that cover the same \

@@ -31,7 +31,7 @@ const FIRST_FILE: u32 = 20_001;
 #[derive(Debug)]
 pub(super) struct FurtherPass {
     /// The site below it.
-    pub(super) site: &'static Site,
+    pub(super) site: &'static Site<'static>,
     /// Number in the name of its file.
     pub(super) number: u32,
     /// When it is over the latitude of the site.
@@ -49,7 +49,7 @@ impl FurtherPass {
     /// `count` passes over each of `sites` after the instant `last`, distributed by chance over the width of the window, in both
     /// directions.
     pub(super) fn over(
-        sites: &[&'static Site],
+        sites: &[&'static Site<'static>],
         count: u32,
         last: Et,
         errors: &SceneErrors,
@@ -66,7 +66,13 @@ impl FurtherPass {
         .collect()
     }
 
-    fn draw(site: &'static Site, number: u32, middle: Et, errors: &SceneErrors, seed: u64) -> Self {
+    fn draw(
+        site: &'static Site<'static>,
+        number: u32,
+        middle: Et,
+        errors: &SceneErrors,
+        seed: u64,
+    ) -> Self {
         let mut random = Random::new(seed, &format!("pass {number}"));
         let half_deg = Site::WINDOW_HALF_LONGITUDE_DEG;
         let longitude_deg = site.longitude_deg + random.between(-half_deg, half_deg);

@@ -63,14 +63,14 @@ pub(super) fn image_name(id: &str) -> String {
 ///
 /// # Errors
 /// An image that does not see the ground, or cannot be encoded; errors of writing.
-pub(super) fn write_images(
+pub(super) fn write_images<'a>(
     folder: &Path,
-    days: &[&Flown],
+    days: &[&Flown<'a>],
     terrain: &Terrain,
     (seed, coder): (u64, Coder),
     session: &Session,
     watch: Watch<'_>,
-) -> Result<Vec<RenderedTruth>> {
+) -> Result<Vec<RenderedTruth<'a>>> {
     let delivered = |flown: &&&Flown| flown.arc.image.is_delivered();
     for flown in days.iter().filter(delivered) {
         watch.announce(flown.arc.image.lines_delivered as usize / 16 * 16);

@@ -212,7 +212,7 @@ pub(super) struct Flightpath<'a> {
 
 impl<'a> Flightpath<'a> {
     /// The day of an image.
-    pub(super) fn of_arc(arc: &'a Arc, seed: u64) -> Self {
+    pub(super) fn of_arc(arc: &'a Arc<'a>, seed: u64) -> Self {
         Self {
             name: arc.image.id.to_owned(),
             orbit: &arc.orbit,

@@ -16,6 +16,7 @@
 //! | `calibration`, `pushbroom_pair` | two stereo lines of a camera for its calibration |
 //! | `calibration_loop`, `line_images` | three lines with their pixels and laser passes: the calibration from pixels |
 //! | `terrain_model`, `passes` | a shifted terrain model, laser passes over it |
+//! | `campaign` | pairs and single images of five mission phases with an index, without site files |
 //! | `kernels`, `pedr`, `sites`, `truth` | the files |
 //! | `mission`, `along` | the entry points of a mission |
 //! | `later_orbit` | an orbit that can replace the one that the sites of a mission use |
@@ -40,6 +41,7 @@ mod archive_frames;
 mod attitude;
 mod calibration;
 mod calibration_loop;
+mod campaign;
 mod context;
 mod drawn;
 mod error;
@@ -82,6 +84,7 @@ pub use along::write_scene_along;
 pub use archive::{ArchiveOptions, ArchiveSummary, write_archive};
 pub use calibration::write_calibration_scene;
 pub use calibration_loop::{LineScene, write_calibration_loop_scene, write_line_scene};
+pub use campaign::{CampaignOptions, CampaignSummary, write_campaign};
 pub use error::SceneError;
 pub use error_sources::{
     AltimeterErrors, AttitudeErrors, CameraErrors, Jitter, Misregistration, PositionErrors, Relief,

@@ -8,6 +8,7 @@ use super::{
     context::{CONTEXT_SITE, ContextImage, context_site, context_ties, in_window},
     drawn::{DayErrors, Flown},
     error::SceneError,
+    error_sources::AltimeterErrors,
     files::{Draft, put},
     further_passes::FurtherPass,
     images::{Coder, write_images},
@@ -37,6 +38,7 @@ use areograph_base::{
 use areograph_geom::{body_rotation::body_matrix, ellipsoid::Spherical};
 use areograph_pds::ties::ties_table;
 use nalgebra::Vector3;
+use serde::Serialize;
 
 /// Fewest and most seconds of frames in a day's file.
 const DAY_S: [f64; 2] = [600.0, 90_000.0];
@@ -99,7 +101,7 @@ pub(super) fn write(
 ) -> Result<SceneSummary> {
     check(options)?;
     let draft = Draft::begin(directory, README)?;
-    let fly = |arc: Arc| {
+    let fly = |arc: Arc<'static>| {
         let errors = DayErrors::draw(&options.errors, &arc, options.seed);
         Flown { arc, errors }
     };
@@ -156,7 +158,7 @@ pub(super) fn write(
         let days: Vec<&Flown> = days.iter().filter(shown).collect();
         truth.rendered = write_images(&folder, &days, &terrain, how, &session, watch)?;
     }
-    write_truth(&draft, &truth)?;
+    write_as_truth(&draft, &truth)?;
     draft.finish()?;
     Ok(SceneSummary::of(directory, &truth, SITES.len() + 1))
 }
@@ -221,7 +223,7 @@ fn write_context(
 }
 
 /// Writes `truth.json`.
-pub(super) fn write_truth(draft: &Draft, truth: &Truth) -> Result<()> {
+pub(super) fn write_as_truth(draft: &Draft, truth: &impl Serialize) -> Result<()> {
     let path = draft.root().join("truth.json");
     let text = serde_json::to_string(truth)
         .map_err(|error| IoError {
@@ -233,7 +235,10 @@ pub(super) fn write_truth(draft: &Draft, truth: &Truth) -> Result<()> {
 }
 
 /// Solves the arcs and writes their kernels, those of further passes, and labels of the delivered images.
-fn write_kernels(draft: &Draft, options: &SceneOptions) -> Result<(Vec<Arc>, Vec<FurtherPass>)> {
+fn write_kernels(
+    draft: &Draft,
+    options: &SceneOptions,
+) -> Result<(Vec<Arc<'static>>, Vec<FurtherPass>)> {
     let kernels = draft.folder("kernels")?;
     let labels = draft.folder("labels")?;
     write_text_kernels(&kernels)?;
@@ -245,7 +250,7 @@ fn write_kernels(draft: &Draft, options: &SceneOptions) -> Result<(Vec<Arc>, Vec
             let start = image_start(&session, image)?;
             Arc::new(image, start, image.pedr_duration_s(options.day_s))
         })
-        .collect::<Result<Vec<Arc>>>()?;
+        .collect::<Result<Vec<Arc<'_>>>>()?;
     arcs.sort_by(|a, b| {
         a.exposed
             .start
@@ -255,7 +260,7 @@ fn write_kernels(draft: &Draft, options: &SceneOptions) -> Result<(Vec<Arc>, Vec
     for arc in arcs.iter().filter(|arc| arc.image.is_delivered()) {
         put(
             &labels.join(format!("{}.lbl", arc.image.id)),
-            &planned_label(arc, &session)?,
+            &planned_label(arc, "EXTENDED", &session)?,
         )?;
     }
     write_attitude(&kernels, &session, &arcs)?;
@@ -279,7 +284,7 @@ fn write_pass(
     pass: &FurtherPass,
     terrain: &Terrain,
     options: &SceneOptions,
-) -> Result<(FileTruth, ProfileTruth)> {
+) -> Result<(FileTruth, ProfileTruth<'static>)> {
     let name = pass.file();
     let request = PedrRequest {
         name: &name,
@@ -304,52 +309,68 @@ fn write_pass(
 }
 
 /// Output of one day.
-struct Day {
+struct Day<'a> {
     file: FileTruth,
     /// Over the day's site.
-    profile: ProfileTruth,
+    profile: ProfileTruth<'a>,
     /// Shots in the window of the wide-angle images.
     kept: Vec<KeptShot>,
 }
 
-/// Writes the PEDR file of one day.
-fn write_day(
+/// Writes the PEDR file of the day of an image; returns its counts and the ground shots selected by `keep`.
+///
+/// # Errors
+/// A beam that misses Mars; errors of writing.
+pub(super) fn write_file_of_day(
     folder: &Path,
     flown: &Flown,
     terrain: &Terrain,
-    options: &SceneOptions,
-) -> Result<Day> {
+    sizes: &AltimeterErrors,
+    seed: u64,
+    keep: impl Fn(&Shot) -> bool,
+) -> Result<(FileTruth, Vec<KeptShot>)> {
     let Flown { arc, errors } = flown;
     let image = arc.image;
     let first = arc.orbit.revolution(arc.frames.start);
-    let name = image.pedr_name();
     let request = PedrRequest {
-        name: &name,
+        name: &image.pedr_name(),
         tags: &frame_tags(arc.frames),
         datum: image.datum(),
         // Names of the mapping phase are orbit numbers plus 10 000.
         orbit: &|et| {
             (image.pedr_number - 10_000).saturating_add_signed(arc.orbit.revolution(et) - first)
         },
-        seed: options.seed ^ u64::from(image.pedr_number),
+        seed: seed ^ u64::from(image.pedr_number),
         errors: LaserErrors {
-            altimeter: options.errors.altimeter,
+            altimeter: *sizes,
             shift: errors.profile_shift.clone(),
         },
     };
+    write_pedr(folder, flown, terrain, &request, keep)
+}
+
+/// Writes the PEDR file of one day.
+fn write_day<'a>(
+    folder: &Path,
+    flown: &Flown<'a>,
+    terrain: &Terrain,
+    options: &SceneOptions,
+) -> Result<Day<'a>> {
+    let arc = &flown.arc;
+    let image = arc.image;
+    let sizes = &options.errors.altimeter;
     let within = |holds: &dyn Fn(f64, f64) -> bool, shot: &Shot| {
         let ground = Spherical::from_xyz_m(&shot.ground_m);
         holds(ground.longitude_rad, ground.latitude.0)
     };
     let in_site = |shot: &Shot| within(&|east, north| image.site.contains(east, north), shot);
     let in_context = |shot: &Shot| within(&in_window, shot);
-    let (file, shots) = write_pedr(folder, flown, terrain, &request, |shot| {
-        in_site(shot) || in_context(shot)
-    })?;
+    let keep = |shot: &Shot| in_site(shot) || in_context(shot);
+    let (file, shots) = write_file_of_day(folder, flown, terrain, sizes, options.seed, keep)?;
     let (mut kept, mut context) = (shots.clone(), shots);
     kept.retain(|kept| in_site(&kept.truth));
     context.retain(|kept| in_context(&kept.truth));
-    let mut profile = ProfileTruth::new(image.site.id, &name, &kept);
+    let mut profile = ProfileTruth::new(image.site.id, &image.pedr_name(), &kept);
     profile.image = Some(image.id);
     profile.orbit_differences = orbit_differences(&versions(arc, options.seed), &arc.orbit, &kept);
     Ok(Day {

@@ -9,18 +9,18 @@ use areograph_config::usual_instrument;
 
 /// A site that two images show.
 #[derive(Debug)]
-pub struct Site {
+pub struct Site<'a> {
     /// Identifier, as in the site's TOML.
-    pub id: &'static str,
+    pub id: &'a str,
     /// Name in the report.
-    pub name: &'static str,
+    pub name: &'a str,
     /// Areocentric latitude of the image centres, IAU 2000, degrees.
     pub latitude_deg: f64,
     /// East longitude of the image centres, IAU 2000, degrees.
     pub longitude_deg: f64,
 }
 
-impl Site {
+impl Site<'_> {
     /// Half the window's extent in latitude, degrees: 59 km in all, where the longest image has 54 km.
     pub const WINDOW_HALF_LATITUDE_DEG: f64 = 0.5;
     /// Half the window's extent in longitude, degrees.
@@ -73,15 +73,15 @@ pub enum Look {
 
 /// An image and the PEDR file of its day.
 #[derive(Debug)]
-pub struct PlannedImage {
+pub struct PlannedImage<'a> {
     /// Product id with `-` for `/`.
-    pub id: &'static str,
+    pub id: &'a str,
     /// The site it shows.
-    pub site: &'static Site,
+    pub site: &'a Site<'a>,
     /// UTC of the first line as published in Shan et al. 2005, Table 2.
-    pub utc_start: &'static str,
+    pub utc_start: &'a str,
     /// The first line as a clock string, rounded down to 1/256 s; this is the truth.
-    pub sclk_start: &'static str,
+    pub sclk_start: &'a str,
     /// Exposure of a detector line, milliseconds.
     pub exposure_ms: f64,
     /// Detector lines and pixels summed.
@@ -102,7 +102,7 @@ pub struct PlannedImage {
     pub whole_day: bool,
 }
 
-impl PlannedImage {
+impl PlannedImage<'_> {
     /// Whether any part of it was delivered.
     #[must_use]
     pub fn is_delivered(&self) -> bool {

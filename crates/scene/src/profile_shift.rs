@@ -192,7 +192,7 @@ mod tests {
     };
     use areograph_base::time::Et;
 
-    fn arc(image: &'static PlannedImage) -> Arc {
+    fn arc(image: &'static PlannedImage) -> Arc<'static> {
         Arc::new(image, Et::from_seconds(3.9e7), 600.0).unwrap()
     }
 

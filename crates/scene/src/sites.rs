@@ -255,6 +255,8 @@ pub(super) fn planned_site<'a>(
 pub(super) struct Label<'a> {
     /// Product id with `-` for `/`.
     pub id: &'a str,
+    /// Mission phase.
+    pub mission_phase: &'a str,
     /// Instrument.
     pub instrument: &'a str,
     /// Filter, if the camera has one.
@@ -281,9 +283,11 @@ pub(super) struct Label<'a> {
 
 /// A detached PDS3 label of the arc's image.
 ///
+/// * `mission_phase` – as the label names it
+///
 /// # Errors
 /// Errors of the session in converting the time of the last line.
-pub(super) fn planned_label(arc: &Arc, session: &Session) -> Result<String> {
+pub(super) fn planned_label(arc: &Arc, mission_phase: &str, session: &Session) -> Result<String> {
     let image = arc.image;
     let look = match image.look {
         Look::Nadir => "nadir",
@@ -291,6 +295,7 @@ pub(super) fn planned_label(arc: &Arc, session: &Session) -> Result<String> {
     };
     Ok(image_label(&Label {
         id: image.id,
+        mission_phase,
         instrument: &usual_instrument().label.instrument,
         filter: None,
         start: image.utc_start,
@@ -313,7 +318,7 @@ pub(super) fn image_label(label: &Label<'_>) -> String {
         format!("FILE_NAME = \"{}.IMQ\"", label.id.replace('-', "")),
         "RECORD_TYPE = UNDEFINED".to_owned(),
         "SPACECRAFT_NAME = MARS_GLOBAL_SURVEYOR".to_owned(),
-        "MISSION_PHASE_NAME = \"EXTENDED\"".to_owned(),
+        format!("MISSION_PHASE_NAME = \"{}\"", label.mission_phase),
         "TARGET_NAME = MARS".to_owned(),
         format!("INSTRUMENT_ID = \"{}\"", label.instrument),
     ];

@@ -32,7 +32,7 @@ const TIES: usize = 154;
 /// Candidate positions of the first image for one tie point.
 const PLACES_PER_TIE: usize = 20;
 /// No tie point is nearer to the edge of an image, pixels: blunders stay inside, plus noise of a pixel.
-const EDGE_PX: f64 = BLUNDER_PX[1] + 5.0;
+pub(super) const EDGE_PX: f64 = BLUNDER_PX[1] + 5.0;
 /// One of this many tie points is a blunder, the first in the middle of the first group.
 const BLUNDER_EVERY: usize = 20;
 /// Shortest and longest blunder, in any direction.
@@ -49,19 +49,19 @@ const TOLD_POSES: u32 = 31;
 
 /// The true image.
 pub(super) struct TrueImage<'a> {
-    pub(super) flown: &'a Flown,
+    pub(super) flown: &'a Flown<'a>,
     pub(super) oriented_camera: OrientedCamera<SampledOrientation>,
 }
 
 /// A ground point and its image coordinates in both images.
-struct Tie {
-    ground_m: Vector3<f64>,
-    measures: [TieMeasure<String>; 2],
+pub(super) struct Tie {
+    pub(super) ground_m: Vector3<f64>,
+    pub(super) measures: [TieMeasure<String>; 2],
 }
 
 impl<'a> TrueImage<'a> {
     /// The image of the day `flown`.
-    pub(super) fn new(flown: &'a Flown, terrain: &Terrain) -> Result<Self> {
+    pub(super) fn new(flown: &'a Flown<'a>, terrain: &Terrain) -> Result<Self> {
         let image = flown.arc.image;
         let intervals = if flown.errors.has_jitter() {
             INTERVALS_OF_JITTER
@@ -109,7 +109,7 @@ impl<'a> TrueImage<'a> {
     }
 
     /// Largest line and sample of a tie point.
-    fn extent_px(&self) -> [f64; 2] {
+    pub(super) fn extent_px(&self) -> [f64; 2] {
         let lines = f64::from(self.flown.arc.image.lines_delivered);
         [lines, self.oriented_camera.detector.samples].map(|length| length - EDGE_PX)
     }
@@ -212,7 +212,7 @@ impl<'a> TrueImage<'a> {
         Ok(camera.focal_px_per_line(0.0, &ground_m))
     }
 
-    fn truth(&self, terrain: &Terrain) -> Result<TieCameraTruth> {
+    fn truth(&self, terrain: &Terrain) -> Result<TieCameraTruth<'a>> {
         let errors = &self.flown.errors;
         let lines = self.oriented_camera.lines();
         let step = lines / f64::from(TOLD_POSES - 1);
@@ -299,6 +299,14 @@ impl TieNoise {
             common: errors.tie_noise_common,
         }
     }
+
+    /// The same with another noise, as site files state it, pixels.
+    pub(super) fn stated_as(self, errors: &SceneErrors, stated_px: f64) -> Self {
+        Self {
+            sigma_px: errors.tie_noise_factor * stated_px,
+            ..self
+        }
+    }
 }
 
 /// Errors that neighbouring tie points have in common: waves over an image, of standard deviation 1.
@@ -333,13 +341,13 @@ impl Waves {
 ///
 /// # Errors
 /// [`SceneError::NoCamera`]; errors of writing.
-pub(super) fn write_ties(
+pub(super) fn write_ties<'a>(
     folder: &Path,
-    [first, second]: [&Flown; 2],
+    [first, second]: [&'a Flown<'a>; 2],
     terrain: &Terrain,
     noise: TieNoise,
     seed: u64,
-) -> Result<TiesTruth> {
+) -> Result<TiesTruth<'a>> {
     let site = first.arc.image.site.id;
     let pair = [
         TrueImage::new(first, terrain)?,
@@ -362,7 +370,7 @@ pub(super) fn ties_name(site: &str) -> String {
 }
 
 /// Tie points distributed over the common ground of both images, measured without error.
-fn exact_ties(
+pub(super) fn exact_ties(
     pair: &[TrueImage<'_>; 2],
     terrain: &Terrain,
     random: &mut Random,
@@ -382,7 +390,7 @@ fn exact_ties(
 }
 
 /// Adds noise to all measurements, and blunders to a few.
-fn spoil(
+pub(super) fn spoil(
     ties: Vec<Tie>,
     noise: TieNoise,
     random: &mut Random,

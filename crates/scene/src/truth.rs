@@ -26,7 +26,7 @@ const EPOCHS: u32 = 31;
 
 /// All true values.
 #[derive(Debug, Serialize)]
-pub(super) struct Truth {
+pub(super) struct Truth<'a> {
     pub made_by: &'static str,
     pub synthetic: &'static str,
     pub orbit: &'static str,
@@ -34,25 +34,25 @@ pub(super) struct Truth {
     pub seed: u64,
     pub errors: SceneErrors,
     pub errors_rule: &'static str,
-    pub errors_drawn: Vec<DrawnTruth>,
+    pub errors_drawn: Vec<DrawnTruth<'a>>,
     pub biases: Biases,
     pub crossover: Crossover,
     pub frame_model: &'static str,
-    pub images: Vec<ImageTruth>,
+    pub images: Vec<ImageTruth<'a>>,
     pub files: Vec<FileTruth>,
-    pub profiles: Vec<ProfileTruth>,
+    pub profiles: Vec<ProfileTruth<'a>>,
     pub tie_rule: &'static str,
-    pub ties: Vec<TiesTruth>,
+    pub ties: Vec<TiesTruth<'a>>,
     pub wide_angle_rule: &'static str,
     pub wide_angle: Vec<ContextTruth>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub rendered: Vec<RenderedTruth>,
+    pub rendered: Vec<RenderedTruth<'a>>,
 }
 
 /// True values of a rendered image.
 #[derive(Debug, Serialize)]
-pub(super) struct RenderedTruth {
-    image: &'static str,
+pub(super) struct RenderedTruth<'a> {
+    image: &'a str,
     coder: &'static str,
     /// Incidence angle of the Sun over the site.
     sun_incidence_deg: f64,
@@ -60,10 +60,10 @@ pub(super) struct RenderedTruth {
     sun_azimuth_deg: f64,
 }
 
-impl RenderedTruth {
+impl<'a> RenderedTruth<'a> {
     /// An image under a Sun at this incidence angle and azimuth, degrees.
     pub(super) const fn new(
-        image: &PlannedImage,
+        image: &PlannedImage<'a>,
         coder: &'static str,
         [sun_incidence_deg, sun_azimuth_deg]: [f64; 2],
     ) -> Self {
@@ -78,15 +78,15 @@ impl RenderedTruth {
 
 /// The errors of the day of one image.
 #[derive(Debug, Serialize)]
-pub(super) struct DrawnTruth {
-    image: &'static str,
+pub(super) struct DrawnTruth<'a> {
+    image: &'a str,
     #[serde(flatten)]
     errors: DayErrors,
 }
 
-impl DrawnTruth {
+impl<'a> DrawnTruth<'a> {
     /// The values drawn for a day.
-    pub(super) fn of(flown: &Flown) -> Self {
+    pub(super) fn of(flown: &Flown<'a>) -> Self {
         Self {
             image: flown.arc.image.id,
             errors: flown.errors.clone(),
@@ -131,6 +131,31 @@ pub(super) struct Biases {
     mola_clock_rule: &'static str,
 }
 
+impl Biases {
+    /// Those of every mission.
+    pub(super) fn injected() -> Self {
+        Self {
+            ck_bias_s: usual_instrument().pointing.ck_bias_s,
+            ck_rule: "the attitude of true time t is stored in the C-kernel at t + ck_bias_s",
+            mola_clock_bias_s: usual_altimeter().clock_bias_s,
+            mola_clock_sign: "late",
+            mola_clock_rule: "true time = tag - mola_clock_bias_s, in all files; coordinates are valid at the true time",
+        }
+    }
+}
+
+impl Crossover {
+    /// That of every mission.
+    pub(super) const fn injected() -> Self {
+        Self {
+            amplitude_m: CROSSOVER_AMPLITUDE_M,
+            period_s: CROSSOVER_PERIOD_S,
+            rule: "in the files, ground and spacecraft are too high by the residual, amplitude_m sin(2 pi et / period_s) at \
+                the mid-point of the frame; radii are the values before its subtraction",
+        }
+    }
+}
+
 /// Injected crossover residual.
 #[derive(Debug, Serialize)]
 pub(super) struct Crossover {
@@ -141,9 +166,9 @@ pub(super) struct Crossover {
 
 /// One image.
 #[derive(Debug, Serialize)]
-pub(super) struct ImageTruth {
-    id: &'static str,
-    site: &'static str,
+pub(super) struct ImageTruth<'a> {
+    id: &'a str,
+    site: &'a str,
     start_et_s: f64,
     line_period_s: f64,
     lines_header: u32,
@@ -209,9 +234,9 @@ pub(super) struct ContextShot {
 
 /// The shots of one file in one window.
 #[derive(Debug, Serialize)]
-pub(super) struct ProfileTruth {
+pub(super) struct ProfileTruth<'a> {
     pub window: String,
-    pub image: Option<&'static str>,
+    pub image: Option<&'a str>,
     pub file: String,
     /// Its offset in the file, of profiles without an image; the errors of an image contain the others.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -238,18 +263,18 @@ pub(super) struct OrbitDifference {
 
 /// The tie points of one site.
 #[derive(Debug, Serialize)]
-pub(super) struct TiesTruth {
-    pub site: &'static str,
+pub(super) struct TiesTruth<'a> {
+    pub site: &'a str,
     /// The two images, in the order of time.
-    pub cameras: [TieCameraTruth; 2],
+    pub cameras: [TieCameraTruth<'a>; 2],
     /// In the order of the file.
     pub ties: Vec<TieTruth>,
 }
 
 /// True exposure of an image.
 #[derive(Debug, Serialize)]
-pub(super) struct TieCameraTruth {
-    pub image: &'static str,
+pub(super) struct TieCameraTruth<'a> {
+    pub image: &'a str,
     pub time_bias_lines: f64,
     pub position_bias_m: [f64; 3],
     /// Focal-plane pixels of a line in the middle of the image.
@@ -278,7 +303,7 @@ pub(super) struct BlunderTruth {
     pub sample_error: f64,
 }
 
-impl Truth {
+impl Truth<'_> {
     /// The true values common to all missions; images, files and profiles are added later.
     pub(super) fn new(seed: u64, errors: &SceneErrors) -> Self {
         Self {
@@ -302,19 +327,8 @@ impl Truth {
                 PEDR file minus their true position. The spacecraft position in the file is the position in gsfc, moved along \
                 the beam until ranges agree with the ground in the file.",
             errors_drawn: Vec::new(),
-            biases: Biases {
-                ck_bias_s: usual_instrument().pointing.ck_bias_s,
-                ck_rule: "the attitude of true time t is stored in the C-kernel at t + ck_bias_s",
-                mola_clock_bias_s: usual_altimeter().clock_bias_s,
-                mola_clock_sign: "late",
-                mola_clock_rule: "true time = tag - mola_clock_bias_s, in all files; coordinates are valid at the true time",
-            },
-            crossover: Crossover {
-                amplitude_m: CROSSOVER_AMPLITUDE_M,
-                period_s: CROSSOVER_PERIOD_S,
-                rule: "in the files, ground and spacecraft are too high by the residual, amplitude_m sin(2 pi et / period_s) at \
-                the mid-point of the frame; radii are the values before its subtraction",
-            },
+            biases: Biases::injected(),
+            crossover: Crossover::injected(),
             frame_model: "Latitude and longitude vary linearly within a PEDR frame. Near the poles, during slews and \
                 on steep ground off nadir, a frame cannot represent 20 true footprints to 0.2 m; frames do not include \
                 jitter. The numbers of affected shots are under files, the largest errors under profiles.",
@@ -339,9 +353,9 @@ impl Truth {
     }
 }
 
-impl ImageTruth {
+impl<'a> ImageTruth<'a> {
     /// Orientation of the arc's image according to the kernels, and the differences of the rival orbits.
-    pub(super) fn of(arc: &Arc, versions: &[Version]) -> Self {
+    pub(super) fn of(arc: &Arc<'a>, versions: &[Version]) -> Self {
         let image = arc.image;
         let step_s = arc.exposed.duration_s() / f64::from(EPOCHS - 1);
         let epochs: Vec<_> = (0..EPOCHS)
@@ -379,7 +393,7 @@ impl ImageTruth {
     }
 }
 
-impl ProfileTruth {
+impl ProfileTruth<'_> {
     /// The kept shots of one file in one window.
     pub(super) fn new(window: &str, file: &str, kept: &[KeptShot]) -> Self {
         Self {

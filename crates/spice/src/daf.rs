@@ -23,7 +23,7 @@ use areograph_base::error::{IoError, Locate, Result};
 /// Increased when [`check_contents`] detects more than before: kernels that passed earlier are checked again.
 pub(super) const CHECK: u32 = 1;
 /// Bytes of a DAF record.
-const RECORD_SIZE: usize = 1_024;
+pub(crate) const RECORD_SIZE: usize = 1_024;
 /// Bytes of a DAF word.
 const WORD_SIZE: usize = 8;
 /// Doubles of a segment summary, in all kernels.

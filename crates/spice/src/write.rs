@@ -193,7 +193,8 @@ fn fill(
         let closed = cspice.close(handle);
         written.and(closed.map_err(Into::into))
     });
-    let whole = written.and_then(|()| daf::segments(path)).map(|_| ());
+    let complete = written.and_then(|()| complete_record(path).in_file(path));
+    let whole = complete.and_then(|()| daf::segments(path)).map(|_| ());
     if existed || whole.is_ok() {
         return whole.in_file(path);
     }
@@ -203,6 +204,17 @@ fn fill(
     refused
         .map_or(whole, |refused| Err(refused.into()))
         .in_file(path)
+}
+
+/// Completes the last record of a new kernel. A kernel whose segments fill their summary records, as 25 do, ends in an empty record of
+/// names, of which CSPICE writes 1,000 of 1,024 bytes.
+fn complete_record(path: &Path) -> std::result::Result<(), IoError> {
+    let complete = || -> io::Result<()> {
+        let file = OpenOptions::new().write(true).open(path)?;
+        let bytes = file.metadata()?.len();
+        file.set_len(bytes.next_multiple_of(daf::RECORD_SIZE as u64))
+    };
+    complete().map_err(IoError::on("write"))
 }
 
 /// Reason why the system cannot write at `path`: CSPICE's messages do not state it.

@@ -31,7 +31,7 @@ fn start(image: &PlannedImage) -> Et {
     Et::from_seconds(since.num_milliseconds() as f64 * 1e-3 + 64.2)
 }
 
-fn flown(site: &str) -> Vec<Flown> {
+fn flown(site: &str) -> Vec<Flown<'static>> {
     let of_site = IMAGES.iter().filter(|image| image.site.id == site);
     let fly = |image| {
         let arc = Arc::new(image, start(image), 1_200.0).unwrap();

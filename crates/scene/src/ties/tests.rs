@@ -11,13 +11,13 @@ use areograph_geom::intersection::{IntersectionLimits, Ray, intersect};
 
 const ROUGH: SceneErrors = SceneErrors::realistic(Roughness::Rough);
 
-fn flown(image: &'static PlannedImage, errors: &SceneErrors, seed: u64) -> Flown {
+fn flown(image: &'static PlannedImage, errors: &SceneErrors, seed: u64) -> Flown<'static> {
     let arc = Arc::new(image, Et::from_seconds(3.9e7), 1_200.0).unwrap();
     let errors = DayErrors::draw(errors, &arc, seed);
     Flown { arc, errors }
 }
 
-fn days(site: &str, errors: &SceneErrors, seed: u64) -> Vec<Flown> {
+fn days(site: &str, errors: &SceneErrors, seed: u64) -> Vec<Flown<'static>> {
     let of_site = IMAGES.iter().filter(|image| image.site.id == site);
     of_site.map(|image| flown(image, errors, seed)).collect()
 }

@@ -90,6 +90,42 @@ fn a_circle_is_read_back_and_tabulated() {
     );
 }
 
+/// A summary record has room for 25 segments; where the last one is full, an empty record of names ends the file.
+#[test]
+fn kernels_of_full_summary_records_are_complete() {
+    let temporary = tempdir().unwrap();
+    let begin = Et::from_seconds(3.7e7);
+    let passes: Vec<(Vec<Et>, Vec<State>)> = (0..50)
+        .map(|pass| {
+            let seconds = (0..8).map(|step| 3_600.0 * f64::from(pass) + 10.0 * f64::from(step));
+            seconds.map(|t| (begin.plus(t), circle(t))).unzip()
+        })
+        .collect();
+    for count in [24, 25, 26, 50] {
+        let segments = passes[..count].iter().map(|(epochs, states)| SpkSegment {
+            target: -94,
+            centre: 499,
+            name: "pass",
+            degree: 7,
+            epochs,
+            states,
+        });
+        let path = temporary.path().join(format!("{count}.bsp"));
+        write_spk(&path, &segments.collect::<Vec<_>>(), "Passes.").unwrap();
+        assert_eq!(
+            std::fs::metadata(&path).unwrap().len() % 1_024,
+            0,
+            "{count}"
+        );
+        let session = Session::open(&KernelSet::from_files(&[path]).unwrap()).unwrap();
+        assert_eq!(session.coverage().unwrap().spk.len(), count);
+        let t = 3_600.0 * (count - 1) as f64 + 35.0;
+        let off_m =
+            (session.state(begin.plus(t)).unwrap().position).distance_m(&circle(t).position);
+        assert!(off_m < 1e-4, "{count} {off_m}");
+    }
+}
+
 #[test]
 fn an_attitude_with_a_gap_is_read_back() {
     let Some(mut files) = times("attitude writer") else {

@@ -37,7 +37,7 @@ use areograph_store::hashes::HashCache;
 /// The mission with its images: from the folder in the environment variable, or a new one.
 struct Mission {
     folder: PathBuf,
-    days: Vec<Flown>,
+    days: Vec<Flown<'static>>,
     terrain: Terrain,
 }
 
