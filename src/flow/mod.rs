@@ -11,6 +11,7 @@ mod bounds;
 mod calibrated_images;
 mod calibration;
 mod calibration_rounds;
+mod campaign;
 mod check;
 mod choice;
 mod compare;
@@ -45,6 +46,7 @@ mod triangulate;
 
 pub use answers::{check_answer, plan_answer, run_answer};
 pub use archive::{ArchiveRequest, archive_filter, archive_limits};
+pub use campaign::{CAMPAIGN, CampaignAnswer, CampaignSite, publish_results};
 pub use check::{Checked, Extent, FoundProducts, check_site, required_by_site, rival_sets};
 pub use choice::{ChooseKernels, KernelChoice, RivalKernelSets};
 pub use compare::{
