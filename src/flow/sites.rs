@@ -10,6 +10,7 @@ use std::{
 
 use serde::Deserialize as _;
 
+use super::campaign::is_of_campaign;
 use crate::{
     body::Body,
     error::{IoError, Locate, Result},
@@ -39,6 +40,9 @@ pub fn publish_sites(out: &Path) -> Result<PathBuf> {
         let folder = entry.map_err(IoError::on("list")).in_file(out)?.path();
         let name = folder.file_name().unwrap_or_default().to_string_lossy();
         let manifest = read_manifest(&folder);
+        if manifest.as_ref().is_some_and(is_of_campaign) {
+            continue;
+        }
         let failure = last_failure(&folder);
         // Folders in which no run ever worked are ignored.
         if manifest.is_some() || has_work(&folder) {

@@ -15,7 +15,8 @@ use std::{
 
 use areograph::{
     config::{
-        self, CalibrationConfig, CampaignConfig, Document, Loaded, NetConfig, ServiceConfig, SiteConfig, ValueKind,
+        self, CalibrationConfig, CampaignConfig, Document, Loaded, NetConfig, ServiceConfig,
+        SiteConfig, ValueKind,
     },
     geom::window::WindowShape,
 };

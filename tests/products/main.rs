@@ -1,6 +1,7 @@
 //! Products, pages, configuration and documents: what is written, and who can read it.
 
 mod architecture;
+mod campaign;
 #[path = "../common/mod.rs"]
 mod common;
 mod config_arbitrary;

@@ -13,6 +13,7 @@ use crate::common;
 
 mod across;
 mod attitude_clock;
+mod campaign;
 mod common_bus;
 mod everything_errs;
 mod flown;

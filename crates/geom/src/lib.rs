@@ -57,6 +57,7 @@ pub mod range_residuals;
 pub mod readings;
 pub mod reference_surface;
 pub mod robust;
+pub mod robust_mean;
 pub mod scattered_heights;
 pub mod slopes;
 pub mod statistics;

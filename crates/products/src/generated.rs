@@ -3,18 +3,19 @@
 use std::fmt::Write as _;
 
 use super::{
-    archive, calibration, laser_match, net,
+    archive, calibration, campaign, laser_match, net,
     product::{Content, Declaration, Group},
     table::{Kind, Meaning},
 };
 use areograph_base::{schema::DocumentSchema, terms::Terms};
 
 /// The flows other than the flow of sites, each with its products.
-const GROUPS: [fn() -> Group; 4] = [
+const GROUPS: [fn() -> Group; 5] = [
     net::group,
     calibration::group,
     laser_match::group,
     archive::group,
+    campaign::group,
 ];
 
 /// JSON Schemas of the documents, each once; `of_sites` are all products of sites.
@@ -170,7 +171,7 @@ mod tests {
                 Some("line" | "lines") => Some("line"),
                 Some("offset") if column.name == "line_offset" => Some("line"),
                 Some("px" | "sample") => Some("pixel"),
-                Some(unit @ ("m" | "km" | "s" | "deg" | "rad")) => Some(unit),
+                Some(unit @ ("m" | "km" | "s" | "ms" | "deg" | "arcsec" | "rad")) => Some(unit),
                 _ => None,
             };
             assert!(foreign || ending == column.unit.symbol(), "{}", column.name);

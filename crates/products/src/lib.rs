@@ -20,6 +20,7 @@ mod adjusted_kernels;
 mod adjustment;
 mod archive;
 mod calibration;
+mod campaign;
 mod coordinates;
 mod correlations;
 pub mod error;
@@ -75,6 +76,7 @@ pub use archive::{
     ArchiveProducts, WorstProfile, profile_name, write_archive_products, write_profile_shots,
 };
 pub use calibration::{CalibrationModel, CalibrationProducts, write_calibration_products};
+pub use campaign::{CAMPAIGN_PAGE, CampaignProducts, write_campaign_products};
 pub use exchange::{
     ContourLayer, ControlMeasure, ControlNetwork, ControlPoint, GroundEstimate, ImageMeasure,
     LidarPoint, NetworkMeasure, NetworkPoint, ProfileShift, on_ground_m, tie_residuals,

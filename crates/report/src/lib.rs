@@ -18,6 +18,7 @@ mod adjustment;
 mod archive;
 mod calibration;
 mod calibration_rounds;
+mod campaign;
 mod checks;
 mod clocks_and_datum;
 mod compare;
@@ -72,6 +73,7 @@ use areograph_products::SiteProducts;
 
 pub use archive::archive_page;
 pub use calibration::calibration_page;
+pub use campaign::campaign_page;
 pub use compare::{KernelComparison, comparison_page};
 pub use diff::difference_page;
 pub use fidelity::{

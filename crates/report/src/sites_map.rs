@@ -2,7 +2,7 @@
 
 mod features;
 
-use std::{f64::consts::TAU, fmt::Write as _};
+use std::{collections::BTreeMap, f64::consts::TAU, fmt::Write as _};
 
 use plotters::{prelude::*, style::text_anchor::HPos};
 
@@ -10,6 +10,7 @@ use self::features::{FEATURES, Feature, Kind};
 use super::{
     html::{Markup, Tone},
     map::labels::{self, LETTERS, Labels, write},
+    numbers::whole,
     plots::{
         COLOURS, Canvas, Drawn, GREY, GRID, INK, Key, MARK, SOFT, WIDTH, drawn, figure_html, image,
         place_behind, quoted,
@@ -33,6 +34,9 @@ const STEP_DEG: i32 = 30;
 const NAMED_DEG: i32 = 60;
 /// Half the size of a mark.
 const MARK_SIZE: i32 = 12;
+/// Side of a cell that has one mark on a map of many sites, and its size on the ground.
+const CELL: i32 = 20;
+const CELL_DEG: f64 = CELL as f64 / PER_DEGREE;
 /// Colours of valid sites and of those with remarks.
 const VALID: usize = 2;
 const REMARKS: usize = 1;
@@ -48,6 +52,7 @@ const GROUND: &str = "Ground: MOLA heights, shaded, in cells of one degree (MEGD
                       latitude.";
 
 /// A site on the map.
+#[derive(Clone, Copy)]
 pub(super) struct Place<'a> {
     pub(super) name: &'a str,
     pub(super) tone: Tone,
@@ -65,14 +70,60 @@ pub(super) fn figure(body: Body, places: &[Place]) -> Result<Markup> {
     }
     let features: Vec<&Feature> = FEATURES.iter().filter(|of| of.body == body).collect();
     let (names, unnamed) = names(places, &features);
+    let of_sites = "Centres of the first windows of the sites; sites whose window is an outline are listed in the table only.";
+    let mut words = String::new();
+    if !unnamed.is_empty() {
+        words = format!(" Not labelled for lack of space: {}.", unnamed.join(", "));
+    }
+    map(body, places, (&features, &names), of_sites, &words)
+}
+
+/// The map of many sites, without their names: one mark for each cell of the map, for the worst site in it.
+///
+/// # Errors
+/// A drawing that cannot be made.
+pub(super) fn figure_of_many(body: Body, places: &[Place]) -> Result<Markup> {
+    let mut cells: BTreeMap<(i32, i32), &Place> = BTreeMap::new();
+    for place in places {
+        let (x, y) = pixel(place.place_deg);
+        let cell = cells.entry((x / CELL, y / CELL)).or_insert(place);
+        if (cell.tone as u8) < place.tone as u8 {
+            *cell = place;
+        }
+    }
+    let marks: Vec<Place> = cells.into_values().copied().collect();
+    let features: Vec<&Feature> = FEATURES.iter().filter(|of| of.body == body).collect();
+    let mut labels = Labels::new(WIDTH as i32 - 4, TOP + MAP_HEIGHT);
+    for place in &marks {
+        labels.keep_off(pixel(place.place_deg), MARK_SIZE);
+    }
+    labels.set_letters(SMALL);
+    for feature in &features {
+        name_feature(feature, &mut labels);
+    }
+    let of_sites = format!(
+        "{} sites; where several lie within {CELL_DEG:.0}° of each other, one mark shows the worst of them.",
+        whole(places.len())
+    );
+    map(body, &marks, (&features, &labels), &of_sites, "")
+}
+
+/// The map with these marks and names; `of_sites` states what marks are, `more` follows the words on the ground.
+fn map(
+    body: Body,
+    places: &[Place],
+    (features, names): (&[&Feature], &Labels),
+    of_sites: &str,
+    more: &str,
+) -> Result<Markup> {
     let is_seen = |of: &&Feature| match of.kind {
         // Discs stand for large features where the ground is not drawn.
         Kind::Extent(_) => body.relief().is_none(),
         // A ring without a name has no meaning.
         Kind::Landing => names.placed.iter().any(|label| label.text == of.name),
     };
-    let seen: Vec<&Feature> = features.into_iter().filter(is_seen).collect();
-    let mut svg = drawn(HEIGHT as u32, |area| draw(places, &seen, &names, area))?;
+    let seen: Vec<&Feature> = features.iter().copied().filter(is_seen).collect();
+    let mut svg = drawn(HEIGHT as u32, |area| draw(places, &seen, names, area))?;
     place_behind(&mut svg, &ground(body));
     let mut csv = "site,longitude_deg,latitude_deg\n".to_owned();
     for place in places {
@@ -89,13 +140,9 @@ pub(super) fn figure(body: Body, places: &[Place]) -> Result<Markup> {
         Some(_) => GROUND,
         None => "Grey: large features with their extent, whole degrees.",
     };
-    let mut words = format!(
-        "Centres of the first windows of the sites; sites whose window is an outline are listed in the table only. \
-         {of_ground} Names of features by the IAU gazetteer; rings: landing sites."
+    let words = format!(
+        "{of_sites} {of_ground} Names of features by the IAU gazetteer; rings: landing sites.{more}"
     );
-    if !unnamed.is_empty() {
-        words += &format!(" Not labelled for lack of space: {}.", unnamed.join(", "));
-    }
     Ok(figure_html(
         &format!("Sites on {body}"),
         &svg,

@@ -9,6 +9,7 @@ use super::{
 };
 use areograph_geom::uncertainty::{GroundPart, UncertaintyBudget};
 use areograph_products::GeometricProducts;
+use areograph_stages::pool_sites::BudgetsPooled;
 
 pub(super) const SECTION: Section = Section {
     title: "Appendix: uncertainty budget of Shan et al. 2005",
@@ -131,6 +132,37 @@ pub(super) fn of_sites(budgets: &[UncertaintyBudget]) -> Markup {
         "Uncertainty budget of Shan et al. 2005, sites with a budget",
         &body,
     )
+}
+
+/// The budgets of a campaign, squares averaged over its pairs.
+pub(super) fn of_campaign(budgets: &BudgetsPooled) -> Markup {
+    let mut published = Table::new(TITLE, COLUMNS);
+    let mut signed = Table::new(SIGNED_TITLE, SIGNED_COLUMNS);
+    let all = (budgets.pairs, Some(&budgets.all), "all");
+    let observed = (
+        budgets.observed_pairs,
+        budgets.observed.as_ref(),
+        "with footprints in both images",
+    );
+    for (pairs, budget, which) in [all, observed] {
+        if let Some(budget) = budget {
+            let head = || {
+                let pairs = counted(pairs as usize, "pair");
+                [Cell::from(format!("{which}: {pairs}")), "before".into()].into_iter()
+            };
+            published.row(true, head().chain(as_published(budget, true).map(untraced)));
+            signed.row(
+                true,
+                head().chain(by_equation_5(budget, true).map(untraced)),
+            );
+        }
+    }
+    html! {
+        (published.finish())
+        p { (WORDS) }
+        (signed.finish())
+        p { (SIGNED_WORDS) }
+    }
 }
 
 /// Shares of orientation and footprints in the observed misregistration apply only before the adjustment.

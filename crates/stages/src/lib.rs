@@ -29,6 +29,7 @@ pub mod match_laser;
 pub mod match_ties;
 pub mod mosaic_images;
 pub mod outline_windows;
+pub mod pool_sites;
 pub mod read_shots;
 pub mod read_ties;
 pub mod rectify_images;

@@ -395,9 +395,18 @@ pub fn damaged_product(
     manifest: &Manifest,
     files: &InputFiles,
 ) -> Option<String> {
-    let hash = |path: &Path| files.hash(path).map(|file| (file.blake3, file.bytes));
-    let (product, _) = differing(site_folder, manifest, hash).next()?;
+    let (product, _) = differing_product(site_folder, manifest, files)?;
     Some(product.path.clone())
+}
+
+/// This product, with the difference, or why it cannot be read.
+pub(super) fn differing_product<'a>(
+    site_folder: &Path,
+    manifest: &'a Manifest,
+    files: &InputFiles,
+) -> Option<(&'a ProductEntry, Result<String>)> {
+    let hash = |path: &Path| files.hash(path).map(|file| (file.blake3, file.bytes));
+    differing(site_folder, manifest, hash).next()
 }
 
 fn differing<'a>(

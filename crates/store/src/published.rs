@@ -3,10 +3,13 @@
 use std::{fs, io::ErrorKind, path::Path};
 
 use super::{
-    manifest::Manifest,
-    publish::{JOURNAL, MANIFEST, damaged, has_work, read_manifest},
+    manifest::{Manifest, ProductEntry},
+    publish::{CACHE, JOURNAL, MANIFEST, damaged, differing_product, has_work, read_manifest},
 };
-use crate::files::short_hash;
+use crate::{
+    files::{InputFiles, short_hash},
+    hashes::HashCache,
+};
 use areograph_base::error::{Cause, IoError, Locate, Result};
 
 /// Reasons why products in a folder are not to be used.
@@ -79,16 +82,57 @@ pub fn read_published_by_this_version(
     made_again: impl Fn(&str) -> bool,
 ) -> Result<Manifest> {
     let manifest = read_published_but(folder, made_again)?;
+    require_this_version(folder, &manifest)?;
+    Ok(manifest)
+}
+
+/// Reads them as [`read_published_by_this_version`], but trusts hashes of products that runs have stored, as the next run of the
+/// site does: unchanged products of thousands of sites are not read again.
+///
+/// # Errors
+/// As [`read_published_by_this_version`].
+pub fn read_published_by_stored_hashes(folder: &Path) -> Result<Manifest> {
+    let manifest = read_unchecked(folder)?;
+    require_this_version(folder, &manifest)?;
+    let files: InputFiles = HashCache::in_folder(&folder.join(CACHE), false).files();
+    match differing_product(folder, &manifest, &files) {
+        Some((product, found)) => {
+            Err(contradicts(product, found?)).in_file(folder.join(&product.path))
+        }
+        None => Ok(manifest),
+    }
+}
+
+fn read_published_but(folder: &Path, made_again: impl Fn(&str) -> bool) -> Result<Manifest> {
+    let manifest = read_unchecked(folder)?;
+    let mut damaged = damaged(folder, &manifest).filter(|(product, _)| !made_again(&product.path));
+    if let Some((product, found)) = damaged.next() {
+        return Err(contradicts(product, found?)).in_file(folder.join(&product.path));
+    }
+    drop(damaged);
+    Ok(manifest)
+}
+
+fn contradicts(product: &ProductEntry, found: String) -> PublishedError {
+    PublishedError::Contradicts {
+        found,
+        expected_bytes: product.bytes,
+        expected: short_hash(&product.blake3),
+    }
+}
+
+fn require_this_version(folder: &Path, manifest: &Manifest) -> Result<()> {
     if manifest.version == env!("CARGO_PKG_VERSION") {
-        return Ok(manifest);
+        return Ok(());
     }
     Err(PublishedError::OtherVersion {
-        found: manifest.version,
+        found: manifest.version.clone(),
     })
     .in_file(folder)
 }
 
-fn read_published_but(folder: &Path, made_again: impl Fn(&str) -> bool) -> Result<Manifest> {
+/// The manifest of complete products, which are not checked against it.
+fn read_unchecked(folder: &Path) -> Result<Manifest> {
     if folder.join(JOURNAL).exists() {
         return Err(PublishedError::Unfinished).in_file(folder);
     }
@@ -99,22 +143,11 @@ fn read_published_but(folder: &Path, made_again: impl Fn(&str) -> bool) -> Resul
         }
         read => read.map_err(IoError::on("read")).in_file(&path)?,
     };
-    let manifest: Manifest = serde_json::from_slice(&bytes)
+    serde_json::from_slice(&bytes)
         .map_err(|error| PublishedError::Unreadable {
             reason: error.to_string(),
         })
-        .in_file(&path)?;
-    let mut damaged = damaged(folder, &manifest).filter(|(product, _)| !made_again(&product.path));
-    if let Some((product, found)) = damaged.next() {
-        return Err(PublishedError::Contradicts {
-            found: found?,
-            expected_bytes: product.bytes,
-            expected: short_hash(&product.blake3),
-        })
-        .in_file(folder.join(&product.path));
-    }
-    drop(damaged);
-    Ok(manifest)
+        .in_file(&path)
 }
 
 /// Checks that `manifest` is still current after its products have been read.

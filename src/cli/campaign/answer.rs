@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use crate::{
     cli::{output, progress::duration},
     error::Kind,
-    flow::{Campaign, Costs, End, SiteEnd},
+    flow::{Campaign, CampaignAnswer, Costs, End, SiteEnd},
     service::words::counted,
 };
 
@@ -16,7 +16,12 @@ const PRINTED_MAX: usize = 10;
 const BYTES_PER_GB: f64 = 1e9;
 
 /// Prints how the sites ended; a failure outranks an invalid site.
-pub(super) fn ended(campaign: &Campaign, ended: &[SiteEnd], as_json: bool) -> ExitCode {
+pub(super) fn ended(
+    campaign: &Campaign,
+    ended: &[SiteEnd],
+    results: &CampaignAnswer,
+    as_json: bool,
+) -> ExitCode {
     let count = |is: &dyn Fn(&SiteEnd) -> bool| ended.iter().filter(|of| is(of)).count();
     let valid = count(&SiteEnd::is_valid);
     let failed = count(&|of| of.failure().is_some());
@@ -39,6 +44,7 @@ pub(super) fn ended(campaign: &Campaign, ended: &[SiteEnd], as_json: bool) -> Ex
             "counts": {"valid": valid, "invalid": invalid, "failed": failed, "unchanged": unchanged},
             "sites": ended,
             "left_out": left_out(campaign),
+            "results": results.to_json(),
         }));
     } else {
         let sites = counted(ended.len(), "site");
@@ -47,6 +53,10 @@ pub(super) fn ended(campaign: &Campaign, ended: &[SiteEnd], as_json: bool) -> Ex
         ));
         print_not_valid(ended);
         print_left_out(campaign);
+        output::line(format_args!(
+            "  tables and page of all sites: {}",
+            results.page.display()
+        ));
     }
     let failure = ended.iter().find_map(SiteEnd::failure);
     let invalid = (invalid > 0).then_some(Kind::Validation.exit_code());

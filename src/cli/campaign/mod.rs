@@ -21,8 +21,11 @@ use super::{
 };
 use crate::{
     config::ExecutorKind,
-    error::{Cause, Locate as _, Result},
-    flow::{Campaign, Costs, RunOptions, SiteEnd, check_out, run_site_file, select_campaign},
+    error::{Cause, Kind, Locate as _, Result, Stopped},
+    flow::{
+        Campaign, Costs, PlannedSite, RunOptions, SiteEnd, check_out, publish_results,
+        run_site_file, select_campaign,
+    },
     service::words::counted,
     store::hashes::HashCache,
     watch::Count,
@@ -87,7 +90,7 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
 }
 
 fn ran(arguments: &Arguments) -> Result<ExitCode> {
-    let mut campaign = select_campaign(&arguments.file)?;
+    let campaign = Arc::new(select_campaign(&arguments.file)?);
     for remark in &campaign.remarks {
         tracing::warn!("{remark}");
     }
@@ -103,15 +106,21 @@ fn ran(arguments: &Arguments) -> Result<ExitCode> {
         for stale in campaign.remove_stale_site_files(&arguments.out)? {
             tracing::info!("{stale}: no longer a site of the campaign; its products remain");
         }
-    } else {
-        let only: BTreeSet<&String> = arguments.only.iter().collect();
-        campaign.sites.retain(|site| only.contains(&site.id));
     }
-    let campaign = Arc::new(campaign);
+    let only: BTreeSet<&String> = arguments.only.iter().collect();
+    let is_wanted = |site: &PlannedSite| only.is_empty() || only.contains(&site.id);
+    let numbers = 0..campaign.sites.len();
+    let wanted: Vec<usize> = numbers
+        .filter(|number| is_wanted(&campaign.sites[*number]))
+        .collect();
     let ended = match campaign.config.executor.kind {
-        ExecutorKind::Local => on_this_machine(&campaign, arguments)?,
-        ExecutorKind::Slurm => slurm::run_sites(&campaign, &arguments.out)?,
+        ExecutorKind::Local => on_this_machine(&campaign, wanted, arguments)?,
+        ExecutorKind::Slurm => slurm::run_sites(&campaign, &wanted, &arguments.out)?,
     };
+    let interrupted = Kind::Interrupted.exit_code();
+    if ended.iter().any(|of| of.failure() == Some(interrupted)) {
+        return Err(Stopped.into());
+    }
     let mut costs = Costs::default();
     ended
         .iter()
@@ -120,7 +129,12 @@ fn ran(arguments: &Arguments) -> Result<ExitCode> {
     if costs.images > 0 {
         costs.keep(&arguments.out)?;
     }
-    Ok(answer::ended(&campaign, &ended, arguments.json))
+    let results = publish_results(
+        &arguments.out,
+        &campaign.config.campaign,
+        &campaign.results_of(),
+    )?;
+    Ok(answer::ended(&campaign, &ended, &results, arguments.json))
 }
 
 /// Refuses a campaign without sites, and unknown sites.
@@ -139,11 +153,16 @@ fn is_selected(campaign: &Campaign, arguments: &Arguments) -> std::result::Resul
 }
 
 /// Runs the sites on this machine; they are returned in their order.
-fn on_this_machine(campaign: &Arc<Campaign>, arguments: &Arguments) -> Result<Vec<SiteEnd>> {
+fn on_this_machine(
+    campaign: &Arc<Campaign>,
+    sites: Vec<usize>,
+    arguments: &Arguments,
+) -> Result<Vec<SiteEnd>> {
     let hashes = HashCache::in_folder(&arguments.out, arguments.rehash);
     let stop = Arc::new(AtomicBool::new(false));
-    let all = campaign.sites.len();
-    let work = (0..all).map(|number| {
+    let all = sites.len();
+    let work = sites.iter().map(|number| {
+        let number = *number;
         let (campaign, stop) = (Arc::clone(campaign), Arc::clone(&stop));
         let (hashes, out) = (hashes.clone(), arguments.out.clone());
         move || {
@@ -154,13 +173,13 @@ fn on_this_machine(campaign: &Arc<Campaign>, arguments: &Arguments) -> Result<Ve
     let progress = Progress::of_work(&campaign.config.campaign);
     let mut ended: Vec<Option<SiteEnd>> = (0..all).map(|_| None).collect();
     let mut done = 0;
-    in_pool(arguments.jobs, &stop, work, |number, result| {
+    in_pool(arguments.jobs, &stop, work, |place, result| {
         done += 1;
         let of = "sites";
         let all = all as u64;
         progress.count("run", Count { done, all, of });
-        let id = &campaign.sites[number].id;
-        ended[number] = Some(result.unwrap_or_else(|failure| SiteEnd::failed(id, &failure)));
+        let id = &campaign.sites[sites[place]].id;
+        ended[place] = Some(result.unwrap_or_else(|failure| SiteEnd::failed(id, &failure)));
     })?;
     Ok(ended.into_iter().flatten().collect())
 }

@@ -68,7 +68,7 @@ enum SlurmError {
 /// # Errors
 /// Site files that cannot be written; a cluster that refuses the job or does not answer; interruption, after which the job is
 /// cancelled.
-pub(super) fn run_sites(campaign: &Campaign, out: &Path) -> Result<Vec<SiteEnd>> {
+pub(super) fn run_sites(campaign: &Campaign, sites: &[usize], out: &Path) -> Result<Vec<SiteEnd>> {
     let signals = Signals::heard()?;
     let cluster = Cluster {
         settings: &campaign.config.executor,
@@ -80,7 +80,7 @@ pub(super) fn run_sites(campaign: &Campaign, out: &Path) -> Result<Vec<SiteEnd>>
     cluster.begin()?;
     let mut files: BTreeMap<&str, PathBuf> = BTreeMap::new();
     let mut ended: BTreeMap<String, SiteEnd> = BTreeMap::new();
-    for site in &campaign.sites {
+    for site in sites.iter().map(|number| &campaign.sites[*number]) {
         match campaign.write_site_file(site, &cluster.out) {
             Ok(path) => drop(files.insert(&site.id, path)),
             Err(failure) => {
@@ -101,7 +101,7 @@ pub(super) fn run_sites(campaign: &Campaign, out: &Path) -> Result<Vec<SiteEnd>>
                     "run",
                     Count {
                         done: (already + done) as u64,
-                        all: campaign.sites.len() as u64,
+                        all: sites.len() as u64,
                         of: "sites",
                     },
                 );

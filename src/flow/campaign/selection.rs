@@ -6,7 +6,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::files::{ImageFiles, files_by_product};
+use super::{
+    files::{ImageFiles, files_by_product},
+    results::CampaignSite,
+};
 use crate::{
     config::{CampaignConfig, CampaignImage, SelectionConfig, SiteTemplate, load_campaign},
     error::Result,
@@ -153,6 +156,22 @@ fn wants(select: &SelectionConfig, image: &IndexedImage) -> bool {
 }
 
 impl Campaign {
+    /// The sites whose results the campaign pools.
+    #[must_use]
+    pub fn results_of(&self) -> Vec<CampaignSite<'_>> {
+        let sites = self.sites.iter();
+        sites
+            .map(|site| CampaignSite {
+                id: &site.id,
+                images: site
+                    .images
+                    .iter()
+                    .map(|number| &self.images[*number].image)
+                    .collect(),
+            })
+            .collect()
+    }
+
     /// The images of every site, and its description.
     fn groups(&self) -> Vec<(Vec<usize>, String)> {
         let mut groups = Vec::new();

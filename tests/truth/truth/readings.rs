@@ -20,7 +20,7 @@ const GROUPS: u32 = 20;
 const FIRST_SEED: u32 = 130_000;
 
 /// Gives the images of a mission names of their own: an image that two sites name is one observation.
-fn rename_images(mission: &Path, number: u32) {
+pub(super) fn rename_images(mission: &Path, number: u32) {
     for site in SITES {
         let path = mission.join(format!("sites/{site}.toml"));
         let text = fs::read_to_string(&path).unwrap();

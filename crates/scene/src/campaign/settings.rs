@@ -16,17 +16,15 @@ pub(super) fn campaign_toml() -> String {
         "# Written by `areograph scene campaign`; paths are relative to the folder of this file.\n\
          campaign = \"synthetic\"\n\
          description = \"Synthetic images of five mission phases\"\n\n\
-         [index]\nfiles = [\"index/cumindex.tab\"]\n\n\
-         [archive]\nlabels = \"labels\"\n\n\
-         [select]\ncameras = [\"{}\"]\nemission_max_deg = {EMISSION_MAX_DEG:?}\nincidence_max_deg = {INCIDENCE_MAX_DEG:?}\n\n\
-         [pairs]\noverlap_min = 0.3\nconvergence_deg = [4.0, 60.0]\nsun_max_deg = 40.0\npixel_ratio_max = 2.0\nper_image_max = 1\n\n\
-         [site]\nmargin_km = 5.0\n\n\
-         [site.kernels]\nmetakernel = \"kernels/{USED_ORBIT}.tm\"\n\n\
-         [site.pointing]\nck_bias_s = {}\nsource = \"{INJECTED}\"\n\n\
-         [site.altimeter_clock]\nbias_s = {}\nsign = \"late\"\nscope = \"spk_lookup\"\nsource = \"{INJECTED}\"\n\n\
-         [site.pedr]\nfiles = [\"pedr/*.b\"]\ndatum = \"auto\"\n\n\
+         [archive]\nindexes = [\"index/cumindex.tab\"]\nfolder = \"labels\"\n\n\
+         [select]\ncameras = [\"{}\"]\nemission_max_deg = {EMISSION_MAX_DEG:?}\nincidence_deg = [0.0, {INCIDENCE_MAX_DEG:?}]\n\n\
+         [pairs]\noverlap_min = 0.3\nconvergence_deg = [4.0, 60.0]\nsun_max_deg = 40.0\npixel_ratio_max = 2.0\n\
          # Tables of tie points state the standard deviations of their measurements.\n\
-         [site.ties]\nfiles = [\"ties/{{site}}.csv\"]\n",
+         ties = \"ties/{{site}}.csv\"\n\n\
+         [kernels]\nmetakernel = \"kernels/{USED_ORBIT}.tm\"\n\n\
+         [pointing]\nck_bias_s = {}\nsource = \"{INJECTED}\"\n\n\
+         [altimeter_clock]\nbias_s = {}\nsign = \"late\"\nscope = \"spk_lookup\"\nsource = \"{INJECTED}\"\n\n\
+         [pedr]\nfiles = [\"pedr/*.b\"]\ndatum = \"auto\"\n",
         usual_instrument().id,
         usual_instrument().pointing.ck_bias_s,
         usual_altimeter().clock_bias_s,
