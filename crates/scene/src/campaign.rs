@@ -20,6 +20,7 @@ use self::{
     index::{Row, Value, write_index},
     misregistration::{ByKernels, Misregistration, Stated, mean},
     plan::{CampaignPlan, PHASES},
+    seen::Seen,
     settings::{EMISSION_MAX_DEG, INCIDENCE_MAX_DEG, README, campaign_toml},
     truth::{CampaignTruth, ImageTruth, PairTruth, RejectedTruth},
 };
@@ -170,7 +171,7 @@ pub fn write_campaign(
             of_images.push(truth);
         }
     }
-    let (lines, rejected) = with_rejected(rows);
+    let (lines, rejected) = with_rejected(&rows);
     write_index(&draft.folder("index")?, &lines)?;
     put(&draft.root().join("campaign.toml"), &campaign_toml())?;
     let summary = CampaignSummary {
@@ -236,7 +237,7 @@ fn survey<'a>(
     let mission_phase = PHASES[place.phase].mission_phase;
     let images = truly.iter().zip(&stated).map(|(image, stated)| {
         let misregistration = stated.of_image(image, terrain)?;
-        let row = seen::row(image, terrain, mission_phase)?;
+        let row = Seen::of(image, terrain)?.row(mission_phase);
         Ok((
             row,
             ImageTruth::new(image.flown, place.phase, misregistration),
@@ -315,7 +316,7 @@ impl<'a> Tied<'a, '_> {
 }
 
 /// Lines of the index: the rows of the images, and rows that a selection must reject, of images that were never taken.
-fn with_rejected(rows: Vec<Row>) -> (Vec<String>, Vec<RejectedTruth>) {
+fn with_rejected(rows: &[Row]) -> (Vec<String>, Vec<RejectedTruth>) {
     let text = |text: &str| Value::Text(text.to_owned());
     let number = Value::Number;
     let changes: [(&'static str, &[(&str, Value)]); 7] = [
@@ -347,10 +348,10 @@ fn with_rejected(rows: Vec<Row>) -> (Vec<String>, Vec<RejectedTruth>) {
         let product_id = format!("{}/{:05}", like.phase(), 90_001 + number);
         let row = like
             .clone()
-            .with("PRODUCT_ID", Value::Text(product_id.clone()));
+            .with("PRODUCT_ID", &Value::Text(product_id.clone()));
         let row = changed
             .iter()
-            .fold(row, |row, (column, value)| row.with(column, value.clone()));
+            .fold(row, |row, (column, value)| row.with(column, value));
         let line = row.line();
         let half = line.split_at(line.len() / 2).0.to_owned();
         lines.push(if changed.is_empty() { half } else { line });

@@ -101,7 +101,7 @@ impl Row {
     }
 
     /// The row with another value of a column.
-    pub(super) fn with(mut self, column: &str, value: Value) -> Self {
+    pub(super) fn with(mut self, column: &str, value: &Value) -> Self {
         let names = COLUMNS.iter().map(|(name, _)| name);
         for (own, _) in self
             .0
@@ -109,7 +109,7 @@ impl Row {
             .zip(names)
             .filter(|(_, name)| **name == column)
         {
-            own.clone_from(&value);
+            own.clone_from(value);
         }
         self
     }

@@ -118,7 +118,7 @@ fn kernels_of_full_summary_records_are_complete() {
             "{count}"
         );
         let session = Session::open(&KernelSet::from_files(&[path]).unwrap()).unwrap();
-        assert_eq!(session.coverage().unwrap().spk.len(), count);
+        assert_eq!(session.coverage().unwrap().spk.as_slice().len(), count);
         let t = 3_600.0 * (count - 1) as f64 + 35.0;
         let off_m =
             (session.state(begin.plus(t)).unwrap().position).distance_m(&circle(t).position);
