@@ -196,13 +196,20 @@ fn pooled_numbers_follow_from_the_documents_of_the_sites() {
     let summary = json(&answer.folder.join("summary.json"));
     assert_eq!(summary["sites"]["sites"], 4);
     let manifest = |site: &str| json(&out.path().join(site).join("manifest.json"));
-    let valid = names.iter().filter(|site| manifest(site)["verdict"]["valid"] == true);
+    let valid = names
+        .iter()
+        .filter(|site| manifest(site)["verdict"]["valid"] == true);
     let valid: Vec<&str> = valid.copied().collect();
     assert!(valid.len() >= 3 && valid.contains(&"case"), "{valid:?}");
     assert_eq!(summary["pairs"], valid.len() - 1);
     for state in ["before", "after"] {
-        let (mut lines, mut metres, mut sizes, mut budgets, mut means) =
-            (Vec::new(), Vec::new(), [Vec::new(), Vec::new()], Vec::new(), Vec::new());
+        let (mut lines, mut metres, mut sizes, mut budgets, mut means) = (
+            Vec::new(),
+            Vec::new(),
+            [Vec::new(), Vec::new()],
+            Vec::new(),
+            Vec::new(),
+        );
         for site in &valid {
             let path = out.path().join(site).join("adjustment.json");
             if !path.is_file() {
@@ -218,22 +225,36 @@ fn pooled_numbers_follow_from_the_documents_of_the_sites() {
                     sizes.push(of("mean_x").hypot(of("deviation_x")));
                 }
                 budgets.push(number(&pair["budget"]["along_px"]));
-                means.push(number(&document[state]["heights"]["above_surface_m"]["mean"]));
+                means.push(number(
+                    &document[state]["heights"]["above_surface_m"]["mean"],
+                ));
             }
         }
         assert!(lines.len() >= 2);
         let pooled = &summary[state];
-        close(number(&pooled["misregistration"]["along_rms_lines"]), root_mean_square(&lines));
-        close(number(&pooled["misregistration"]["along_rms_m"]), root_mean_square(&metres));
+        close(
+            number(&pooled["misregistration"]["along_rms_lines"]),
+            root_mean_square(&lines),
+        );
+        close(
+            number(&pooled["misregistration"]["along_rms_m"]),
+            root_mean_square(&metres),
+        );
         for (image, sizes) in sizes.iter().enumerate() {
             let found = number(&pooled["residuals"]["images"][image]["size_along_lines"]);
             close(found, root_mean_square(sizes));
         }
         // Each of these sites has one pair, and all tie points are in both images.
-        close(number(&pooled["heights"]["means_rms_m"]), root_mean_square(&means));
+        close(
+            number(&pooled["heights"]["means_rms_m"]),
+            root_mean_square(&means),
+        );
         if state == "before" {
             // Eq. 7 with the squares averaged over the sites.
-            close(number(&summary["budget"]["all"]["along_px"]), root_mean_square(&budgets));
+            close(
+                number(&summary["budget"]["all"]["along_px"]),
+                root_mean_square(&budgets),
+            );
         }
     }
     let (mut shots, mut sum, mut profiles) = (0.0, 0.0, 0);
@@ -271,24 +292,48 @@ fn tables_are_divided_by_phase_and_sites_without_products_are_rows_with_the_reas
         let of = answer.summary.sites;
         [of.sites, of.invalid, of.failed, of.absent, of.unusable]
     };
-    let valid = |answer: &CampaignAnswer| answer.summary.sites.valid + answer.summary.sites.valid_with_remarks;
+    let valid = |answer: &CampaignAnswer| {
+        answer.summary.sites.valid + answer.summary.sites.valid_with_remarks
+    };
     assert_eq!(counts(&sound), [5, 4 - valid(&sound), 0, 1, 0]);
-    let phases: Vec<String> = rows(&sound.folder, "pairs").into_iter().map(|of| of.0).collect();
-    assert_eq!(phases, ["E02"]);
+    let phases: Vec<String> = rows(&sound.folder, "pairs")
+        .into_iter()
+        .map(|of| of.0)
+        .collect();
+    assert_eq!(phases, ["E02", "unknown"]);
     let images = rows(&sound.folder, "images");
     let of_phase: Vec<(String, usize)> = images
         .iter()
         .map(|(phase, rows)| (phase.clone(), rows.num_rows()))
         .collect();
-    assert_eq!(of_phase[..2], [("E02".to_owned(), 5), ("E04".to_owned(), 1)]);
+    assert_eq!(
+        of_phase[..2],
+        [("E02".to_owned(), 5), ("E04".to_owned(), 1)]
+    );
     assert_eq!(of_phase[2].0, "unknown");
     let orbit = &images[1].1;
     assert_eq!(numbers(orbit, "orbit"), [Some(101.0)]);
-    assert_eq!(orbit.column_by_name("inside").unwrap().as_primitive::<UInt32Type>().len(), 1);
+    assert_eq!(
+        orbit
+            .column_by_name("inside")
+            .unwrap()
+            .as_primitive::<UInt32Type>()
+            .len(),
+        1
+    );
 
     spoil("eos_chasma", "ranges.json", "\"shots\"", "\"Shots\"");
-    spoil("gusev_crater", "manifest.json", "\"version\": \"", "\"version\": \"9.");
-    fs::write(out.path().join("isidis/.failed"), "a kernel is gone\n  what to do: look").unwrap();
+    spoil(
+        "gusev_crater",
+        "manifest.json",
+        "\"version\": \"",
+        "\"version\": \"9.",
+    );
+    fs::write(
+        out.path().join("isidis/.failed"),
+        "a kernel is gone\n  what to do: look",
+    )
+    .unwrap();
     let answer = publish(out.path(), &names);
     assert_eq!(valid(&answer), valid(&sound) - 3);
     assert_eq!(counts(&answer), [5, counts(&sound)[1], 1, 1, 2]);
@@ -302,16 +347,33 @@ fn tables_are_divided_by_phase_and_sites_without_products_are_rows_with_the_reas
     }
     let reason = |site: &str| reasons.iter().find(|of| of[0] == site).unwrap();
     assert_eq!(reason("isidis")[1..], ["failed", "a kernel is gone"]);
-    assert_eq!(reason("never_run")[1..], ["absent", "no run of the site has finished"]);
+    assert_eq!(
+        reason("never_run")[1..],
+        ["absent", "no run of the site has finished"]
+    );
     let [_, state, failure] = reason("eos_chasma");
-    assert!(state == "unusable" && failure.starts_with("eos_chasma/ranges.json: has "), "{failure}");
+    assert!(
+        state == "unusable" && failure.starts_with("eos_chasma/ranges.json: has "),
+        "{failure}"
+    );
     let [_, state, failure] = reason("gusev_crater");
-    assert!(state == "unusable" && failure.contains("areograph 9."), "{failure}");
+    assert!(
+        state == "unusable" && failure.contains("areograph 9."),
+        "{failure}"
+    );
     // The index still has their images.
-    let images: usize = rows(&answer.folder, "images").iter().map(|of| of.1.num_rows()).sum();
+    let images: usize = rows(&answer.folder, "images")
+        .iter()
+        .map(|of| of.1.num_rows())
+        .sum();
     assert!(images >= 6);
     let page = fs::read_to_string(&answer.page).unwrap();
-    for words in ["1 failed", "1 without products", "2 with unusable products", "a kernel is gone"] {
+    for words in [
+        "1 failed",
+        "1 without products",
+        "2 with unusable products",
+        "a kernel is gone",
+    ] {
         assert!(page.contains(words), "{words}");
     }
     assert!(!page.contains("<script") && !page.contains(&out.path().display().to_string()));
@@ -321,7 +383,10 @@ fn tables_are_divided_by_phase_and_sites_without_products_are_rows_with_the_reas
 fn the_same_products_give_the_same_bytes_for_any_number_of_threads() {
     let out = sites(&SITES[..3]);
     let written = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
         let answer = pool.install(|| publish(out.path(), &SITES[..3]));
         products(&answer.folder)
     };
@@ -335,11 +400,13 @@ fn the_same_products_give_the_same_bytes_for_any_number_of_threads() {
     assert_eq!(fewer.summary.sites.sites, 1);
     assert!(!fewer.folder.join("images/phase=unknown").exists());
     // A file of another program in the place of a table is not replaced.
-    fs::write(fewer.folder.join("pairs.csv"), "mine").unwrap();
-    fs::remove_file(fewer.folder.join("manifest.json")).unwrap();
-    let refused = publish_results(out.path(), "test", &[]);
-    assert!(refused.is_err());
-    assert_eq!(fs::read(fewer.folder.join("pairs.csv")).unwrap(), b"mine");
+    let other = tempfile::tempdir().unwrap();
+    let table = other.path().join("campaign/pairs.csv");
+    fs::create_dir(other.path().join("campaign")).unwrap();
+    fs::write(&table, "mine").unwrap();
+    let refused = publish_results(other.path(), "test", &[]).unwrap_err();
+    assert!(refused.to_string().contains("pairs.csv"), "{refused}");
+    assert_eq!(fs::read(&table).unwrap(), b"mine");
 }
 
 #[test]
@@ -373,7 +440,10 @@ fn duckdb_finds_the_pooled_numbers_in_the_tables() {
         ("range_shots", "/ranges/shots"),
         ("order2_x_rmse_m", "/polynomials/1/position_m/0"),
     ] {
-        close(number(&found[name]), number(summary.pointer(pointer).unwrap()));
+        close(
+            number(&found[name]),
+            number(summary.pointer(pointer).unwrap()),
+        );
     }
 }
 
@@ -389,8 +459,16 @@ fn many_sites_take_little_memory() {
     let template = out.path().join("gusev_crater");
     let peak_mb = || {
         let status = fs::read_to_string("/proc/self/status").unwrap();
-        let line = status.lines().find(|line| line.starts_with("VmHWM:")).unwrap();
-        line.split_whitespace().nth(1).unwrap().parse::<f64>().unwrap() / 1024.0
+        let line = status
+            .lines()
+            .find(|line| line.starts_with("VmHWM:"))
+            .unwrap();
+        line.split_whitespace()
+            .nth(1)
+            .unwrap()
+            .parse::<f64>()
+            .unwrap()
+            / 1024.0
     };
     let mut peaks = Vec::new();
     for count in counts {

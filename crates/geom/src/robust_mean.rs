@@ -157,7 +157,10 @@ fn huber(used: &[Observation]) -> (f64, f64) {
 
 /// 1.4826 times the median size.
 fn nmad_about_zero(residuals: &[f64]) -> f64 {
-    let sizes: Vec<f64> = residuals.iter().flat_map(|of| [-of.abs(), of.abs()]).collect();
+    let sizes: Vec<f64> = residuals
+        .iter()
+        .flat_map(|of| [-of.abs(), of.abs()])
+        .collect();
     Summary::of(&sizes).nmad
 }
 

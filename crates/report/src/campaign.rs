@@ -37,7 +37,11 @@ pub fn campaign_page(summary: &CampaignSummary, rows: &CampaignRows) -> Result<S
         (downloads())
         div.plots { (figures::map(rows)?) }
     };
-    Ok(page(&format!("Campaign {}", summary.campaign), &lead, &sections))
+    Ok(page(
+        &format!("Campaign {}", summary.campaign),
+        &lead,
+        &sections,
+    ))
 }
 
 /// The worst state that a site has.
@@ -85,7 +89,13 @@ fn biases(summary: &CampaignSummary) -> Markup {
     let undecided = summary.phases.len() - biased.len() - free.len();
     let each: Vec<String> = biased
         .iter()
-        .filter_map(|phase| Some(format!("{} ({})", phase.phase, with_sigma(&phase.along_m?.mean, 1))))
+        .filter_map(|phase| {
+            Some(format!(
+                "{} ({})",
+                phase.phase,
+                with_sigma(&phase.along_m?.mean, 1)
+            ))
+        })
         .collect();
     let mut sentences = Vec::new();
     if !each.is_empty() {
@@ -115,7 +125,11 @@ fn with_sigma(mean: &RobustMean, decimals: usize) -> String {
     let sigma = mean
         .sigma
         .map(|sigma| format!(" ± {}", number(sigma, decimals)));
-    format!("{}{} m", signed(mean.value, decimals), sigma.unwrap_or_default())
+    format!(
+        "{}{} m",
+        signed(mean.value, decimals),
+        sigma.unwrap_or_default()
+    )
 }
 
 /// A number that is read first, with a note.
@@ -131,7 +145,11 @@ fn key_numbers(summary: &CampaignSummary) -> Markup {
         };
         before.map(|_| format!("{} → {}", text(before), text(after)))
     };
-    let along = arrow(before.map(|of| of.along_rms_m), after.map(|of| of.along_rms_m), 1);
+    let along = arrow(
+        before.map(|of| of.along_rms_m),
+        after.map(|of| of.along_rms_m),
+        1,
+    );
     let spacings = arrow(
         before.and_then(|of| of.along_rms_spacings),
         after.and_then(|of| of.along_rms_spacings),
@@ -139,7 +157,11 @@ fn key_numbers(summary: &CampaignSummary) -> Markup {
     );
     let mean = before.and_then(|of| of.along_mean_m);
     let [low, high] = [&summary.before, &summary.after].map(|of| of.heights.as_ref());
-    let heights = arrow(low.map(|of| of.means_rms_m), high.map(|of| of.means_rms_m), 1);
+    let heights = arrow(
+        low.map(|of| of.means_rms_m),
+        high.map(|of| of.means_rms_m),
+        1,
+    );
     html! {
         dl.numbers {
             @if let Some(along) = along {
@@ -198,12 +220,19 @@ fn quantity(of: Option<Quantity>, decimals: usize) -> String {
     let Some(of) = of else {
         return "–".to_owned();
     };
-    let sigma = of.mean.sigma.map(|sigma| format!(" ± {}", number(sigma, decimals)));
+    let sigma = of
+        .mean
+        .sigma
+        .map(|sigma| format!(" ± {}", number(sigma, decimals)));
     let mark = match of.differs_from_zero {
         Some(true) => " *",
         _ => "",
     };
-    format!("{}{}{mark}", signed(of.mean.value, decimals), sigma.unwrap_or_default())
+    format!(
+        "{}{}{mark}",
+        signed(of.mean.value, decimals),
+        sigma.unwrap_or_default()
+    )
 }
 
 /// Phases with rows; the table of pairs has the others.
@@ -261,3 +290,6 @@ fn how(summary: &CampaignSummary) -> Markup {
         @if let Some(budget) = &summary.budget { (uncertainty::of_campaign(budget)) }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -70,8 +70,7 @@ pub(super) fn figure(body: Body, places: &[Place]) -> Result<Markup> {
     }
     let features: Vec<&Feature> = FEATURES.iter().filter(|of| of.body == body).collect();
     let (names, unnamed) = names(places, &features);
-    let of_sites =
-        "Centres of the first windows of the sites; sites whose window is an outline are listed in the table only.";
+    let of_sites = "Centres of the first windows of the sites; sites whose window is an outline are listed in the table only.";
     let mut words = String::new();
     if !unnamed.is_empty() {
         words = format!(" Not labelled for lack of space: {}.", unnamed.join(", "));

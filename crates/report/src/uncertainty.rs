@@ -151,7 +151,10 @@ pub(super) fn of_campaign(budgets: &BudgetsPooled) -> Markup {
                 [Cell::from(format!("{which}: {pairs}")), "before".into()].into_iter()
             };
             published.row(true, head().chain(as_published(budget, true).map(untraced)));
-            signed.row(true, head().chain(by_equation_5(budget, true).map(untraced)));
+            signed.row(
+                true,
+                head().chain(by_equation_5(budget, true).map(untraced)),
+            );
         }
     }
     html! {

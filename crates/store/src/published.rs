@@ -96,7 +96,9 @@ pub fn read_published_by_stored_hashes(folder: &Path) -> Result<Manifest> {
     require_this_version(folder, &manifest)?;
     let files: InputFiles = HashCache::in_folder(&folder.join(CACHE), false).files();
     match differing_product(folder, &manifest, &files) {
-        Some((product, found)) => Err(contradicts(product, found?)).in_file(folder.join(&product.path)),
+        Some((product, found)) => {
+            Err(contradicts(product, found?)).in_file(folder.join(&product.path))
+        }
         None => Ok(manifest),
     }
 }

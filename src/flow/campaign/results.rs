@@ -117,7 +117,10 @@ pub fn publish_results(
 fn rows_of(out: &Path, sites: &[CampaignSite<'_>]) -> CampaignRows {
     let mut rows = CampaignRows::default();
     for some in sites.chunks(SITES_AT_ONCE) {
-        let read: Vec<SiteRows> = some.par_iter().map(|site| rows_of_site(out, site)).collect();
+        let read: Vec<SiteRows> = some
+            .par_iter()
+            .map(|site| rows_of_site(out, site))
+            .collect();
         for site in read {
             rows.sites.push(site.site);
             rows.images.extend(site.images);

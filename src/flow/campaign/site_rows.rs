@@ -349,7 +349,10 @@ impl Outcome<'_> {
 /// The profile with the most shots during the exposure of an image, and their number.
 fn simultaneous(profiles: &[Profile], image: usize) -> Option<(&Profile, u32)> {
     let of = profiles.iter().flat_map(|profile| {
-        let own = profile.simultaneous.iter().filter(move |of| of.image == image);
+        let own = profile
+            .simultaneous
+            .iter()
+            .filter(move |of| of.image == image);
         own.map(move |of| (profile, of.shots))
     });
     of.max_by_key(|(_, shots)| *shots)
@@ -359,7 +362,10 @@ fn rejected_because(profile: &LeftOutProfile) -> String {
     let evidence = if profile.misplaced {
         format!("misplaced, misfit {:.1}", profile.misfit)
     } else {
-        format!("{} m above the profiles that it crosses", signed(profile.above_m, 1))
+        format!(
+            "{} m above the profiles that it crosses",
+            signed(profile.above_m, 1)
+        )
     };
     format!("{evidence} ({} profiles)", profile.others.len())
 }

@@ -70,8 +70,11 @@ fn the_offset_of_a_phase_is_found_and_the_other_phase_has_none() {
                 let name = format!("{site}-{phase}-{number}");
                 fs::rename(part.join(site), out.join(&name)).unwrap();
                 let text = fs::read_to_string(mission.join(format!("sites/{site}.toml"))).unwrap();
-                let images = text.lines().filter_map(|line| line.strip_prefix("id = \"E"));
-                let images = images.map(|rest| indexed(&format!("E{}", rest.trim_end_matches('"')), phase));
+                let images = text
+                    .lines()
+                    .filter_map(|line| line.strip_prefix("id = \"E"));
+                let images =
+                    images.map(|rest| indexed(&format!("E{}", rest.trim_end_matches('"')), phase));
                 sites.push((name, images.collect()));
             }
         }
@@ -100,7 +103,11 @@ fn the_offset_of_a_phase_is_found_and_the_other_phase_has_none() {
             clock.mean.sigma.unwrap(),
             clock.mean.limit_sigmas.unwrap_or_default(),
         );
-        let truth_s = if phase.phase == "offset" { CLOCK_S } else { 0.0 };
+        let truth_s = if phase.phase == "offset" {
+            CLOCK_S
+        } else {
+            0.0
+        };
         let limit_s = clock.mean.limit_sigmas.unwrap() * clock.mean.sigma.unwrap();
         assert!((clock.mean.value - truth_s).abs() < limit_s, "{phase:?}");
         assert_eq!(clock.differs_from_zero, Some(truth_s > 0.0), "{phase:?}");

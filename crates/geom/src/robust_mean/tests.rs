@@ -60,7 +60,11 @@ fn draw(random: &mut Random, groups: usize, estimate: f64, slope: bool) -> Vec<O
     for group in 0..groups {
         let shared = random.normal();
         for _ in 0..3 {
-            let factor = if slope { random.between(-2.0, 2.0) } else { 1.0 };
+            let factor = if slope {
+                random.between(-2.0, 2.0)
+            } else {
+                1.0
+            };
             let far = random.between(0.0, 1.0) < 0.05;
             let error = 100.0 * (shared + random.normal()) * if far { 20.0 } else { 1.0 };
             drawn.push(Observation {
@@ -76,19 +80,31 @@ fn draw(random: &mut Random, groups: usize, estimate: f64, slope: bool) -> Vec<O
 #[test]
 #[allow(clippy::print_stdout, reason = "what was measured is worth reading")]
 fn a_bias_is_found_where_there_is_one_and_nowhere_else() {
-    for (groups, slope) in [(4, false), (7, false), (8, false), (12, false), (40, false), (12, true), (40, true)] {
+    for (groups, slope) in [
+        (4, false),
+        (7, false),
+        (8, false),
+        (12, false),
+        (40, false),
+        (12, true),
+        (40, true),
+    ] {
         let trials = 4_000;
         let mut random = Random::new(3, "robust means");
         let (mut squares, mut false_alarms) = (0.0, 0);
         for _ in 0..trials {
             let truth = random.between(-500.0, 500.0);
             let found = RobustMean::of(&draw(&mut random, groups, truth, slope)).unwrap();
-            squares += ((found.value - truth) / found.sigma.unwrap()).powi(2).min(25.0);
+            squares += ((found.value - truth) / found.sigma.unwrap())
+                .powi(2)
+                .min(25.0);
             let none = RobustMean::of(&draw(&mut random, groups, 0.0, slope)).unwrap();
             false_alarms += usize::from(none.differs_from_zero() == Some(true));
         }
         let ratio = (squares / f64::from(trials)).sqrt();
-        println!("{groups} groups, slope {slope}: errors over stated {ratio:.3}, false alarms {false_alarms} of {trials}");
+        println!(
+            "{groups} groups, slope {slope}: errors over stated {ratio:.3}, false alarms {false_alarms} of {trials}"
+        );
         // A fraction of 0.27 % of 4,000 is 11; small samples of estimated standard deviations have more.
         assert!(false_alarms <= 40, "{groups} {slope}: {false_alarms}");
         let most = if groups < 12 { 1.5 } else { 1.2 };

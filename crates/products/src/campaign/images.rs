@@ -15,9 +15,7 @@ pub(super) static TABLE: Declaration<WriteCampaign> = Declaration {
     rows: "images of sites",
     role: Role::Data,
     content: Content::Table(|| meanings(&columns())),
-    write: |folder, of| {
-        write_parts(folder, "images", columns, &of.rows.images, |row| &row.phase)
-    },
+    write: |folder, of| write_parts(folder, "images", columns, &of.rows.images, |row| &row.phase),
     uses: &[],
 };
 
@@ -59,9 +57,12 @@ fn exposure<'a>() -> Vec<Column<&'a ImageRow>> {
             "whether the site is valid: only such rows are pooled",
             |row: &Row| row.is_valid,
         ),
-        column("image", Unit::None, "identifier of the image", |row: &Row| {
-            row.image.clone()
-        }),
+        column(
+            "image",
+            Unit::None,
+            "identifier of the image",
+            |row: &Row| row.image.clone(),
+        ),
         column(
             "orbit",
             Unit::None,
@@ -157,7 +158,9 @@ fn text<'a>(
     of: fn(&OrientedImageRow) -> &String,
 ) -> Column<&'a ImageRow> {
     column(name, Unit::None, description, move |row: &&ImageRow| {
-        row.oriented.as_ref().map_or_else(String::new, |of_row| of(of_row).clone())
+        row.oriented
+            .as_ref()
+            .map_or_else(String::new, |of_row| of(of_row).clone())
     })
 }
 
@@ -223,7 +226,11 @@ fn polynomials<'a>() -> Vec<Column<&'a ImageRow>> {
                 result(
                     concat!("order", $order, "_x_rmse_m"),
                     Unit::Metre,
-                    concat!("root mean square residual of X about the polynomial of ", $words, " order (Table 4 of Shan et al. 2005)"),
+                    concat!(
+                        "root mean square residual of X about the polynomial of ",
+                        $words,
+                        " order (Table 4 of Shan et al. 2005)"
+                    ),
                     |of| Some(of.rmse[$place].position_m[0]),
                 ),
                 result(

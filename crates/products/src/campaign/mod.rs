@@ -6,9 +6,12 @@
 mod images;
 mod pairs;
 mod profiles;
+mod read;
 mod sites;
 
 use std::{collections::BTreeMap, path::Path};
+
+pub use read::{CampaignTable, is_campaign, read_campaign_tables};
 
 use super::{
     files::{write_json, write_text},
@@ -120,7 +123,11 @@ pub fn write_campaign_products(directory: &Path, of: &CampaignProducts) -> Resul
         let path = directory.join(declaration.path);
         (declaration.write)(directory, of).in_file(path)
     });
-    Ok(written.collect::<Result<Vec<_>>>()?.into_iter().flatten().collect())
+    Ok(written
+        .collect::<Result<Vec<_>>>()?
+        .into_iter()
+        .flatten()
+        .collect())
 }
 
 /// Writes the rows of each phase to a Parquet file of its own; without a row, one of the unknown phase with the columns.
@@ -133,7 +140,10 @@ fn write_parts<'a, R: Sync + 'a>(
 ) -> Result<Vec<Product>> {
     let mut parts: BTreeMap<&str, Vec<&R>> = BTreeMap::new();
     for row in rows {
-        parts.entry(phase_or_unknown(phase(row))).or_default().push(row);
+        parts
+            .entry(phase_or_unknown(phase(row)))
+            .or_default()
+            .push(row);
     }
     if parts.is_empty() {
         parts.insert(phase_or_unknown(""), Vec::new());

@@ -18,7 +18,9 @@ pub(super) static TABLE: Declaration<WriteCampaign> = Declaration {
     role: Role::Data,
     content: Content::Table(|| meanings(&columns())),
     write: |folder, of| {
-        write_parts(folder, "pairs", columns, &of.rows.pairs, |row| &row.phases[0])
+        write_parts(folder, "pairs", columns, &of.rows.pairs, |row| {
+            &row.phases[0]
+        })
     },
     uses: &[],
 };

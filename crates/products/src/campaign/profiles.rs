@@ -17,7 +17,9 @@ pub(super) static TABLE: Declaration<WriteCampaign> = Declaration {
     role: Role::Data,
     content: Content::Table(|| meanings(&columns())),
     write: |folder, of| {
-        write_parts(folder, "profiles", columns, &of.rows.profiles, |row| &row.phase)
+        write_parts(folder, "profiles", columns, &of.rows.profiles, |row| {
+            &row.phase
+        })
     },
     uses: &[],
 };

@@ -15,9 +15,7 @@ pub(super) static TABLE: Declaration<WriteCampaign> = Declaration {
     rows: "sites",
     role: Role::Data,
     content: Content::Table(|| meanings(&columns())),
-    write: |folder, of| {
-        write_parts(folder, "sites", columns, &of.rows.sites, |row| &row.phase)
-    },
+    write: |folder, of| write_parts(folder, "sites", columns, &of.rows.sites, |row| &row.phase),
     uses: &[],
 };
 
@@ -64,9 +62,12 @@ fn columns<'a>() -> Vec<Column<&'a SiteRow>> {
             "exceeded limits, in words; empty if no limit is exceeded",
             |row: &Row| row.reasons.join("; "),
         ),
-        column("remarks", Unit::None, "remarks of the verdict", |row: &Row| {
-            row.remarks.join("; ")
-        }),
+        column(
+            "remarks",
+            Unit::None,
+            "remarks of the verdict",
+            |row: &Row| row.remarks.join("; "),
+        ),
         column(
             "failure",
             Unit::None,

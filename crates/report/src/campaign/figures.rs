@@ -39,9 +39,7 @@ pub(super) fn misregistration(rows: &CampaignRows) -> Result<Markup> {
         .filter(|pair| pair.before.misregistration.is_some())
         .collect();
     if pairs.is_empty() {
-        return Ok(paragraph(
-            "No valid pair has footprints in both images.",
-        ));
+        return Ok(paragraph("No valid pair has footprints in both images."));
     }
     let over: [(&str, &'static str, fn(&PairRow) -> Option<f64>); 3] = [
         ("emission", "larger emission of the pair, degrees", |pair| {
@@ -77,9 +75,16 @@ pub(super) fn misregistration(rows: &CampaignRows) -> Result<Markup> {
 
 /// The year of a text that begins with a calendar date or a day of the year, with its fraction.
 fn year(utc: &str) -> Option<f64> {
-    let calendar = utc.get(..10).map(|text| NaiveDate::parse_from_str(text, "%Y-%m-%d"));
-    let ordinal = utc.get(..8).map(|text| NaiveDate::parse_from_str(text, "%Y-%j"));
-    let date = [calendar, ordinal].into_iter().flatten().find_map(std::result::Result::ok)?;
+    let calendar = utc
+        .get(..10)
+        .map(|text| NaiveDate::parse_from_str(text, "%Y-%m-%d"));
+    let ordinal = utc
+        .get(..8)
+        .map(|text| NaiveDate::parse_from_str(text, "%Y-%j"));
+    let date = [calendar, ordinal]
+        .into_iter()
+        .flatten()
+        .find_map(std::result::Result::ok)?;
     Some(f64::from(date.year()) + f64::from(date.ordinal0()) / YEAR_DAYS)
 }
 
@@ -95,14 +100,12 @@ fn shown(pairs: usize) -> String {
     )
 }
 
-fn panels(
-    pairs: &[&PairRow],
-    at: &dyn Fn(usize, &PairRow) -> Option<f64>,
-) -> Vec<Panel> {
+fn panels(pairs: &[&PairRow], at: &dyn Fn(usize, &PairRow) -> Option<f64>) -> Vec<Panel> {
     let series = |label: &str, colour: usize, of: fn(&PairRow) -> Option<&PairState>| {
-        let points = pairs.iter().enumerate().filter_map(|(index, pair)| {
-            Some((at(index, pair)?, along_m(pair, of(pair))?))
-        });
+        let points = pairs
+            .iter()
+            .enumerate()
+            .filter_map(|(index, pair)| Some((at(index, pair)?, along_m(pair, of(pair))?)));
         let points: Vec<(f64, f64)> = points.collect();
         Series::dots(label, colour, thinned(&points, POINTS_MAX))
     };
@@ -138,12 +141,7 @@ fn plot_over(
     )
 }
 
-fn plot_by(
-    pairs: &[&PairRow],
-    name: &str,
-    axis: &'static str,
-    of: fn(&PairRow) -> String,
-) -> Plot {
+fn plot_by(pairs: &[&PairRow], name: &str, axis: &'static str, of: fn(&PairRow) -> String) -> Plot {
     let names: Vec<String> = pairs.iter().map(|pair| of(pair)).collect();
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     for name in &names {

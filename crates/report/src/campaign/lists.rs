@@ -28,7 +28,11 @@ fn largest<'a, R>(rows: &'a [R], of: impl Fn(&R) -> Option<f64>) -> Vec<&'a R> {
         .filter_map(|row| Some((of(row)?.abs(), row)))
         .collect();
     ranked.sort_by(|one, other| other.0.total_cmp(&one.0));
-    ranked.into_iter().take(LISTED).map(|(_, row)| row).collect()
+    ranked
+        .into_iter()
+        .take(LISTED)
+        .map(|(_, row)| row)
+        .collect()
 }
 
 fn along_m(pair: &PairRow) -> Option<f64> {
@@ -150,7 +154,11 @@ fn of_state(sites: Vec<&SiteRow>, heading: &str) -> Markup {
     let count = sites.len();
     let mut table = Table::new(
         &format!("{heading}: {}", whole(count)),
-        &[Column::Text("site"), Column::Text("phase"), Column::Text("reason")],
+        &[
+            Column::Text("site"),
+            Column::Text("phase"),
+            Column::Text("reason"),
+        ],
     );
     for site in sites.into_iter().take(LISTED) {
         let reason = if site.failure.is_empty() {
@@ -162,7 +170,10 @@ fn of_state(sites: Vec<&SiteRow>, heading: &str) -> Markup {
             SiteState::Published => page_of(&site.site, ""),
             _ => (&site.site).into(),
         };
-        table.row(false, [name, (&site.phase).into(), shortened(&reason).into()]);
+        table.row(
+            false,
+            [name, (&site.phase).into(), shortened(&reason).into()],
+        );
     }
     html! {
         (table.finish())

@@ -71,7 +71,9 @@ fn ranges(summary: &CampaignSummary) -> Markup {
     for (name, of) in rows {
         if let Some(of) = of {
             let largest = [of.means_m.min, of.means_m.max];
-            let largest = largest.into_iter().max_by(|a, b| a.abs().total_cmp(&b.abs()));
+            let largest = largest
+                .into_iter()
+                .max_by(|a, b| a.abs().total_cmp(&b.abs()));
             table.row(
                 true,
                 [
@@ -179,7 +181,9 @@ fn misregistration(summary: &CampaignSummary) -> Markup {
                     whole(of.footprints).into(),
                     label(of.along_rms_lines, 2).into(),
                     label(of.along_rms_m, 1).into(),
-                    spacings.map_or_else(|| "–".to_owned(), |of| label(of, 3)).into(),
+                    spacings
+                        .map_or_else(|| "–".to_owned(), |of| label(of, 3))
+                        .into(),
                     label(of.across_rms_px, 2).into(),
                     label(of.across_rms_m, 1).into(),
                 ],

@@ -138,7 +138,9 @@ impl PairMisregistration {
         let footprints: u32 = found.profiles.iter().map(|of| of.lines.n).sum();
         let mean = |of: &dyn Fn(&ProfileByTies) -> f64| {
             let sum = found.profiles.iter();
-            let sum: f64 = sum.map(|profile| f64::from(profile.lines.n) * of(profile)).sum();
+            let sum: f64 = sum
+                .map(|profile| f64::from(profile.lines.n) * of(profile))
+                .sum();
             sum / f64::from(footprints)
         };
         if footprints == 0 {
@@ -184,7 +186,11 @@ impl PairHeights {
     pub fn of(heights: &HeightCheck, ties: &Ties, images: [usize; 2]) -> Option<Self> {
         heights.surface.as_ref().ok()?;
         let has_both = |tie: usize| {
-            let measures = ties.points.get(tie).into_iter().flat_map(|tie| &tie.measures);
+            let measures = ties
+                .points
+                .get(tie)
+                .into_iter()
+                .flat_map(|tie| &tie.measures);
             let of: BTreeSet<usize> = measures.map(|measure| measure.image).collect();
             images.iter().all(|image| of.contains(image))
         };

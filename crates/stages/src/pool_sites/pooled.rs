@@ -142,7 +142,8 @@ impl RmsePooled {
         let of_order = |(place, order): (usize, u8)| {
             let oriented = images.iter().filter_map(|image| image.oriented.as_ref());
             let rmse: Vec<_> = oriented.map(|image| image.rmse[place]).collect();
-            let position = |axis: usize| root_mean_square(rmse.iter().map(|of| of.position_m[axis]));
+            let position =
+                |axis: usize| root_mean_square(rmse.iter().map(|of| of.position_m[axis]));
             let angle = |axis: usize| root_mean_square(rmse.iter().map(|of| of.angles_rad[axis]));
             Some(Self {
                 order,
@@ -256,7 +257,10 @@ impl MisregistrationPooled {
         let spacings = found.iter().filter_map(|(_, _, of)| of.along_spacings);
         Some(Self {
             pairs: count(found.len()),
-            footprints: found.iter().map(|(_, _, of)| u64::from(of.footprints)).sum(),
+            footprints: found
+                .iter()
+                .map(|(_, _, of)| u64::from(of.footprints))
+                .sum(),
             along_rms_lines: root_mean_square(found.iter().map(|(_, _, of)| of.along_lines))?,
             along_rms_m: root_mean_square(found.iter().map(|(_, _, of)| of.along_m.value))?,
             along_rms_spacings: root_mean_square(spacings),

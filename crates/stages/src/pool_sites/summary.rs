@@ -172,7 +172,9 @@ pub fn pool_sites(campaign: &str, rows: &CampaignRows) -> CampaignSummary {
 }
 
 fn budgets(pairs: &[(&PairRow, usize)]) -> Option<BudgetsPooled> {
-    let all = pairs.iter().filter_map(|(pair, _)| pair.budget.as_ref().ok());
+    let all = pairs
+        .iter()
+        .filter_map(|(pair, _)| pair.budget.as_ref().ok());
     let all: Vec<UncertaintyBudget> = all.cloned().collect();
     let observed = all.iter().filter(|budget| budget.total_along_px.is_some());
     let observed: Vec<UncertaintyBudget> = observed.cloned().collect();
