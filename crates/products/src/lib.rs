@@ -76,7 +76,10 @@ pub use archive::{
     ArchiveProducts, WorstProfile, profile_name, write_archive_products, write_profile_shots,
 };
 pub use calibration::{CalibrationModel, CalibrationProducts, write_calibration_products};
-pub use campaign::{CAMPAIGN_PAGE, CampaignProducts, write_campaign_products};
+pub use campaign::{
+    CAMPAIGN_PAGE, CampaignProducts, CampaignTable, is_campaign, read_campaign_tables,
+    write_campaign_products,
+};
 pub use exchange::{
     ContourLayer, ControlMeasure, ControlNetwork, ControlPoint, GroundEstimate, ImageMeasure,
     LidarPoint, NetworkMeasure, NetworkPoint, ProfileShift, on_ground_m, tie_residuals,

@@ -290,3 +290,6 @@ fn how(summary: &CampaignSummary) -> Markup {
         @if let Some(budget) = &summary.budget { (uncertainty::of_campaign(budget)) }
     }
 }
+
+#[cfg(test)]
+mod tests;

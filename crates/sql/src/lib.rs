@@ -12,6 +12,6 @@ mod text;
 
 pub use datafusion;
 
-pub use question::{Question, ask};
+pub use question::{Question, ask, ask_tables};
 pub use table::{Columns, ShotsTable, Tally};
 pub use text::{as_table, as_text, as_text_schema};

@@ -4,7 +4,10 @@ use std::sync::Arc;
 
 use areograph_base::error::{Cause, Kind};
 use datafusion::{
+    arrow::{datatypes::SchemaRef, record_batch::RecordBatch},
+    catalog::TableProvider,
     common::DataFusionError,
+    datasource::MemTable,
     execution::{
         SendableRecordBatchStream, memory_pool::FairSpillPool, runtime_env::RuntimeEnvBuilder,
     },
@@ -39,7 +42,7 @@ impl Cause for Question {
             DataFusionError::IoError(_) => {
                 "check the disk that contains the temporary files, then retry"
             }
-            _ => "\"describe shots\" lists the columns; text is written in 'single quotes'",
+            _ => "\"describe\" and the name of a table, such as \"describe shots\", lists the columns; text is written in 'single quotes'",
         }
         .to_owned()
     }
@@ -51,13 +54,37 @@ impl Cause for Question {
 /// # Errors
 /// An invalid query, or one that would change a table.
 pub async fn ask(table: ShotsTable, question: &str) -> Result<SendableRecordBatchStream, Question> {
+    answer(vec![(TABLE, Arc::new(table))], question).await
+}
+
+/// The rows of the answer from tables in memory, each with its name, columns and rows.
+///
+/// # Errors
+/// An invalid query, or one that would change a table; rows with other columns than those of their table.
+pub async fn ask_tables(
+    tables: Vec<(&str, SchemaRef, Vec<RecordBatch>)>,
+    question: &str,
+) -> Result<SendableRecordBatchStream, Question> {
+    let mut known: Vec<(&str, Arc<dyn TableProvider>)> = Vec::new();
+    for (name, schema, batches) in tables {
+        known.push((name, Arc::new(MemTable::try_new(schema, vec![batches])?)));
+    }
+    answer(known, question).await
+}
+
+async fn answer(
+    tables: Vec<(&str, Arc<dyn TableProvider>)>,
+    question: &str,
+) -> Result<SendableRecordBatchStream, Question> {
     let memory =
         RuntimeEnvBuilder::new().with_memory_pool(Arc::new(FairSpillPool::new(MEMORY_BYTES)));
     let config = SessionConfig::new()
         .with_target_partitions(1)
         .with_information_schema(true);
     let context = SessionContext::new_with_config_rt(config, memory.build_arc()?);
-    context.register_table(TABLE, Arc::new(table))?;
+    for (name, table) in tables {
+        context.register_table(name, table)?;
+    }
     let read_only = SQLOptions::new()
         .with_allow_ddl(false)
         .with_allow_dml(false)

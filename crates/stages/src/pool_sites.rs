@@ -25,3 +25,6 @@ pub use rows::{
     SiteState,
 };
 pub use summary::{BudgetsPooled, CampaignSummary, SiteCounts, StatePooled, pool_sites};
+
+#[cfg(test)]
+mod tests;

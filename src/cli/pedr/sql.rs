@@ -3,11 +3,12 @@
 mod answer;
 
 use std::{
-    path::PathBuf,
+    path::{Path, PathBuf},
     sync::{Arc, PoisonError, atomic::AtomicBool},
 };
 
 use clap::{Args, ValueEnum};
+use tokio::runtime::Runtime;
 use tokio_stream::StreamExt as _;
 
 use self::answer::Answer;
@@ -15,23 +16,28 @@ use crate::cli::{output, stop::Signals};
 use crate::{
     error::{IoError, Result, Stopped},
     pds::archive::Opened,
-    products::ShotColumns,
-    sql::{Question, ShotsTable, Tally, ask},
+    products::{ShotColumns, is_campaign, read_campaign_tables},
+    sql::{
+        Question, ShotsTable, Tally, ask, ask_tables,
+        datafusion::execution::SendableRecordBatchStream,
+    },
 };
 
-/// Answers an SQL query on the shots of an archive, the table `shots`.
+/// Answers an SQL query on the shots of an archive, the table `shots`, or on the results of a campaign.
 ///
 /// The table has the columns of `footprints.parquet` except `windows` ("describe shots" lists them) in IAU 2000, and one row for
 /// every shot with a return, of any class; times are the tags of the files, TDB seconds past J2000. With conditions on
 /// `longitude_deg`, `latitude_deg`, `et_s` and `source_file`, most of the archive is not read; with an index (`pedr index`), even
 /// less is read. The answer is complete, or the command fails. Tables are read-only.
 ///
+/// Of the folder `campaign` of a campaign, the tables are `sites`, `images`, `pairs` and `profiles`.
+///
 /// Example: `areograph pedr sql archive "select orbit, count(*), avg(topography_m) from shots where latitude_deg between
 /// -5.5 and -4 and longitude_deg between 137 and 138 and class = 1 group by orbit order by orbit"`
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
-    /// PEDR files, and folders with .b files in and below them.
+    /// PEDR files, and folders with .b files in and below them; or the folder of the results of a campaign.
     #[arg(required = true, value_name = "PATH")]
     paths: Vec<PathBuf>,
     /// The SQL query.
@@ -54,6 +60,11 @@ enum Format {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<()> {
+    if let [folder] = &*arguments.paths
+        && is_campaign(folder)
+    {
+        return run_on_campaign(folder, arguments);
+    }
     let Opened { sources, failures } = Opened::all(&arguments.paths)?;
     let mut failures = failures.into_iter();
     if let Some(first) = failures.next() {
@@ -67,17 +78,38 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
         Arc::clone(signals.stop()),
     );
     let tally = table.tally();
-    let runtime = tokio::runtime::Builder::new_current_thread().build();
-    let runtime = runtime.map_err(IoError::on("start an asynchronous runtime"))?;
-    let answered = runtime.block_on(answer(table, arguments, signals.stop()));
+    let answered = runtime()?.block_on(async {
+        let rows = ask(table, &arguments.question).await?;
+        answer(rows, arguments, signals.stop()).await
+    });
     let mut tally = tally.lock().unwrap_or_else(PoisonError::into_inner);
     tell(&tally);
     // Failures beyond the last requested row are ignored.
     answered.map_err(|told| tally.failure.take().unwrap_or(told))
 }
 
-async fn answer(table: ShotsTable, arguments: &Arguments, stop: &AtomicBool) -> Result<()> {
-    let mut rows = ask(table, &arguments.question).await?;
+fn runtime() -> Result<Runtime> {
+    let runtime = tokio::runtime::Builder::new_current_thread().build();
+    Ok(runtime.map_err(IoError::on("start an asynchronous runtime"))?)
+}
+
+/// Answers from the tables of the campaign in `folder`, which are read into memory: about a kilobyte for each row.
+fn run_on_campaign(folder: &Path, arguments: &Arguments) -> Result<()> {
+    let tables = read_campaign_tables(folder)?.into_iter();
+    let tables = tables.map(|table| (table.name, table.schema, table.batches));
+    let tables: Vec<_> = tables.collect();
+    let signals = Signals::heard()?;
+    runtime()?.block_on(async {
+        let rows = ask_tables(tables, &arguments.question).await?;
+        answer(rows, arguments, signals.stop()).await
+    })
+}
+
+async fn answer(
+    mut rows: SendableRecordBatchStream,
+    arguments: &Arguments,
+    stop: &AtomicBool,
+) -> Result<()> {
     let mut answer = match &arguments.out {
         Some(out) => Answer::in_file(out, &rows.schema())?,
         None => Answer::printed(arguments.format, rows.schema())?,

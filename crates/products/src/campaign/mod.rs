@@ -6,9 +6,12 @@
 mod images;
 mod pairs;
 mod profiles;
+mod read;
 mod sites;
 
 use std::{collections::BTreeMap, path::Path};
+
+pub use read::{CampaignTable, is_campaign, read_campaign_tables};
 
 use super::{
     files::{write_json, write_text},
