@@ -44,7 +44,11 @@ use crate::{
     schema::DocumentSchema,
     stage::{Output, Stage},
     stage_inputs,
-    stages::{convert_datum::Converted, group_profiles::Profile, judge::Findings},
+    stages::{
+        convert_datum::Converted,
+        group_profiles::{Profile, windows_of},
+        judge::Findings,
+    },
     store::book::Book,
     verdict::{Check, CheckKind, CheckOutcome::Warning},
 };
@@ -81,6 +85,7 @@ stage_inputs! {
 
 impl Stage for MeasureSpacing<'_> {
     const NAME: &'static str = "measure_spacing";
+    const METHOD: u32 = 2;
     type Output = Vec<ProfileSpacing>;
     stage_inputs!(fingerprint);
 
@@ -94,11 +99,13 @@ impl Stage for MeasureSpacing<'_> {
             files.map(|file| (file, PEDR_PERIOD_S)).collect()
         };
         let spacings = profiles.iter().map(|of| {
-            let mut windows = self.windows.iter();
-            let window = windows.find(|window| window.id == of.window);
-            let region = window.and_then(|window| region(&window.shape));
+            let seen_in = windows_of(footprints, &of.rows);
+            let windows = self.windows.iter().enumerate();
+            let own = windows.filter(|(bit, _)| seen_in >> bit & 1 == 1);
+            let regions: Option<Vec<Region>> =
+                own.map(|(_, window)| region(&window.shape)).collect();
             let period_s = file(footprints, of).and_then(|file| periods_s.get(&file).copied());
-            spacing(footprints, &of.rows, period_s, region.as_ref())
+            spacing(footprints, &of.rows, period_s, regions.as_deref())
         });
         Ok(spacings.collect())
     }
@@ -187,7 +194,7 @@ fn spacing(
     footprints: &Footprints<BodyFixed>,
     rows: &[u32],
     period_s: Option<f64>,
-    region: Option<&Region>,
+    regions: Option<&[Region]>,
 ) -> ProfileSpacing {
     let rows = pulses(footprints, rows);
     let place = |row: usize| {
@@ -207,7 +214,7 @@ fn spacing(
         let lost = pulses as u32 - 1;
         let inside = (1..=lost).filter(|pulse| {
             let at = one.lerp(&other, f64::from(*pulse) / pulses);
-            region.is_none_or(|region| contains(region, &at))
+            regions.is_none_or(|regions| regions.iter().any(|region| contains(region, &at)))
         });
         let inside = u32::try_from(inside.count()).unwrap_or(u32::MAX);
         if lost == 0 {

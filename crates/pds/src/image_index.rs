@@ -14,6 +14,7 @@ use chrono::NaiveDateTime;
 use super::{
     index_columns::{self, Column, Fields},
     label::{LABEL_BYTES_MAX, parse},
+    moc::product_named,
 };
 use areograph_base::{
     error::{Cause, IoError, Locate as _, Result},
@@ -131,6 +132,17 @@ pub struct IndexedImage {
 }
 
 impl IndexedImage {
+    /// The mission phase by which images are named, such as `E02`: months of the mapping mission. Without such a name, the
+    /// phase that the index states, which is `MAPPING` or `EXTENDED` for years of images; empty if unknown.
+    #[must_use]
+    pub fn phase(&self) -> &str {
+        const LETTERS: usize = 3;
+        let of_index = self.orbit.as_ref().map_or("", |(phase, _)| phase);
+        let is_named = product_named(&self.product_id).is_some();
+        let name = is_named.then(|| self.product_id.get(..LETTERS)).flatten();
+        name.unwrap_or(of_index)
+    }
+
     /// The start of the first line, if it is a valid time.
     #[must_use]
     pub fn utc(&self) -> Option<NaiveDateTime> {

@@ -1,9 +1,9 @@
 //! Grouping of the footprints of one orbit inside one window into profiles, marked where an image was exposed at the
-//! same time.
+//! same time. Windows that share a footprint act as one window: a pass over both is one profile, with one shift.
 //!
 //! This is a separate stage, because profiles need footprints and image times, and two stages need profiles.
 
-use std::sync::atomic::AtomicBool;
+use std::{collections::BTreeSet, sync::atomic::AtomicBool};
 
 use serde::{Deserialize, Serialize};
 
@@ -22,12 +22,12 @@ use areograph_store::{
     stage_inputs,
 };
 
-/// Shots of one orbit inside one window, in order of time.
+/// Shots of one orbit inside one window, or inside windows that overlap, in order of time.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Profile {
     /// `<window>/<orbit>`, with `.2`, `.3` … when the orbit crosses the window again.
     pub id: String,
-    /// Window identifier.
+    /// Window identifier; of windows that overlap, the first that contains a shot of the profile.
     pub window: String,
     /// Orbit number in the PEDR.
     pub orbit: u32,
@@ -86,7 +86,7 @@ stage_inputs! {
 
 impl Stage for GroupProfiles<'_> {
     const NAME: &'static str = "group_profiles";
-    const METHOD: u32 = 3;
+    const METHOD: u32 = 4;
     const CHECKED: bool = true;
     type Output = Vec<Profile>;
     stage_inputs!(fingerprint);
@@ -99,9 +99,9 @@ impl Stage for GroupProfiles<'_> {
     }
 }
 
-/// Groups footprints by window, orbit and pause.
+/// Groups footprints by window, orbit and pause; windows that share a footprint are one group.
 ///
-/// Profiles are in the order of the windows and, within one, of time.
+/// Profiles are in the order of the groups' first windows and, within one, of time.
 #[must_use]
 pub fn group_profiles(
     footprints: &Footprints<BodyFixed>,
@@ -109,10 +109,10 @@ pub fn group_profiles(
     images: &[ImageTimes],
 ) -> Vec<Profile> {
     let mut profiles = Vec::new();
-    for (bit, window) in windows.iter().enumerate() {
+    for group in groups_of_windows(footprints.windows.iter()) {
         let mut rows: Vec<u32> = (0_u32..)
             .zip(&footprints.windows)
-            .filter(|(_, mask)| mask >> bit & 1 == 1)
+            .filter(|(_, mask)| *mask & group != 0)
             .map(|(row, _)| row)
             .collect();
         // The sort is stable: shots with equal times stay in file order.
@@ -127,17 +127,46 @@ pub fn group_profiles(
             footprints.orbit.at(a) == footprints.orbit.at(b)
                 && footprints.et_s.at(b) - footprints.et_s.at(a) <= Profile::PAUSE_S
         });
-        let first_of_window = profiles.len();
+        let first_of_group = profiles.len();
         for rows in crossings {
+            let seen_in = windows_of(footprints, rows);
+            let window = windows.get(seen_in.trailing_zeros() as usize);
+            let window = window.map_or("", |window| &*window.id);
             let orbit = footprints.orbit.at(rows[0] as usize);
-            let earlier = profiles[first_of_window..]
+            let earlier = profiles[first_of_group..]
                 .iter()
-                .filter(|profile: &&Profile| profile.orbit == orbit)
+                .filter(|profile: &&Profile| profile.orbit == orbit && profile.window == window)
                 .count();
-            profiles.push(profile(footprints, &window.id, earlier, rows, images));
+            profiles.push(profile(footprints, window, earlier, rows, images));
         }
     }
     profiles
+}
+
+/// The windows of some rows as bits.
+#[must_use]
+pub fn windows_of(footprints: &Footprints<BodyFixed>, rows: &[u32]) -> u64 {
+    let masks = rows.iter().map(|row| footprints.windows.at(*row as usize));
+    masks.fold(0, |all, mask| all | mask)
+}
+
+/// Sets of windows that share footprints, as bits, in the order of their first windows.
+fn groups_of_windows(masks: impl Iterator<Item = u64>) -> Vec<u64> {
+    let distinct: BTreeSet<u64> = masks.collect();
+    let mut groups: Vec<u64> = Vec::new();
+    for mask in distinct.into_iter().filter(|mask| *mask != 0) {
+        let mut joined = mask;
+        groups.retain(|group| {
+            let is_apart = group & mask == 0;
+            if !is_apart {
+                joined |= group;
+            }
+            is_apart
+        });
+        groups.push(joined);
+    }
+    groups.sort_by_key(|group| group.trailing_zeros());
+    groups
 }
 
 fn profile(
@@ -177,5 +206,24 @@ fn profile(
         rows: rows.to_vec(),
         interval: Interval::new(time(&rows[0]), time(&rows[rows.len() - 1])),
         simultaneous,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn windows_that_share_footprints_are_one_group() {
+        let groups_of_windows = |masks: &[u64]| groups_of_windows(masks.iter().copied());
+        assert!(groups_of_windows(&[]).is_empty());
+        assert_eq!(groups_of_windows(&[0b1, 0b10, 0b1]), [0b1, 0b10]);
+        // The first and the third share a footprint; the fourth and the third do, too.
+        assert_eq!(
+            groups_of_windows(&[0b1, 0b10, 0b100, 0b101, 0b1100, 0b1000]),
+            [0b1101, 0b10]
+        );
+        // Two groups become one by a later mask.
+        assert_eq!(groups_of_windows(&[0b11, 0b1100, 0b1010]), [0b1111]);
     }
 }

@@ -11,7 +11,9 @@ use super::{
     results::CampaignSite,
 };
 use crate::{
-    config::{CampaignConfig, CampaignImage, SelectionConfig, SiteTemplate, load_campaign},
+    config::{
+        CampaignConfig, CampaignImage, SelectionConfig, SiteTemplate, absolute, load_campaign,
+    },
     error::Result,
     geom::window::{Region, WindowShape},
     pds::{
@@ -95,7 +97,7 @@ pub fn select_campaign(path: &Path) -> Result<Campaign> {
     }
     merge(&mut images);
     let files = match &config.archive.folder {
-        Some(folder) => Some(files_by_product(folder)?),
+        Some(folder) => Some(files_by_product(&absolute(folder)?)?),
         None => None,
     };
     let mut campaign = Campaign {
@@ -136,7 +138,7 @@ fn wants(select: &SelectionConfig, image: &IndexedImage) -> bool {
     let [least_rad, most_rad] = select.incidence_rad;
     let of_phase = |phase: &String| {
         let of_index = image.orbit.as_ref().map(|(name, _)| name);
-        of_index == Some(phase) || image.product_id.get(..3) == Some(phase.as_str())
+        of_index == Some(phase) || image.phase() == phase
     };
     let in_orbits = |[first, last]: [u32; 2]| {
         let orbit = image.orbit.as_ref().map(|(_, number)| *number);

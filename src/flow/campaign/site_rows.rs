@@ -85,10 +85,7 @@ fn of_index(indexed: &IndexedImage) -> ImageRow {
     let [emission_rad, incidence_rad, _] = indexed.angles_rad;
     let [instrument, filter] = &indexed.instrument;
     ImageRow {
-        phase: indexed
-            .orbit
-            .as_ref()
-            .map_or_else(String::new, |(phase, _)| phase.clone()),
+        phase: indexed.phase().to_owned(),
         orbit: indexed.orbit.as_ref().map(|(_, orbit)| *orbit),
         utc_start: indexed.utc_start.clone(),
         camera: format!("{instrument} {filter}").trim().to_owned(),
