@@ -6,5 +6,16 @@
 mod results;
 mod site_rows;
 
+use crate::pds::image_index::IndexedImage;
+
 pub(in crate::flow) use results::is_of_campaign;
-pub use results::{CAMPAIGN, CampaignAnswer, CampaignSite, publish_results};
+pub use results::{CAMPAIGN, CampaignAnswer, publish_results};
+
+/// A site of a campaign.
+#[derive(Debug, Clone)]
+pub struct CampaignSite<'a> {
+    /// Its identifier, which is the name of its folder.
+    pub id: &'a str,
+    /// Its images in the index; those that the index does not have are missing.
+    pub images: Vec<&'a IndexedImage>,
+}
