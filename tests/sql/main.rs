@@ -15,12 +15,17 @@ use std::{
     sync::Arc,
 };
 
-use areograph::body::Datum;
+use areograph::body::{Body, Datum};
 use areograph::sql::datafusion::{
     datasource::MemTable,
     prelude::{SessionConfig, SessionContext},
 };
-use areograph::{pds::archive::Opened, products::ShotColumns, sql::ShotsTable};
+use areograph::{
+    pds::archive::Opened,
+    products::{CampaignProducts, ShotColumns, write_campaign_products},
+    sql::ShotsTable,
+    stages::pool_sites::{CampaignRows, KernelSetName, SiteRow, SiteState, pool_sites},
+};
 use areograph_testing::track::{FRAMES, write};
 use arrow_array::RecordBatch;
 use arrow_select::concat::concat_batches;
@@ -422,4 +427,62 @@ fn a_file_that_changes_under_a_question_ends_it() {
     assert!(answer.is_err());
     let failure = tally.lock().unwrap().failure.take().unwrap();
     assert!(failure.to_string().contains("ap19020k.b"), "{failure}");
+}
+
+/// Rows of two sites, in phases whose names folders must encode.
+fn campaign(folder: &Path) {
+    let row = |site: &str, phase: &str, ties: u32| SiteRow {
+        site: site.to_owned(),
+        phase: phase.to_owned(),
+        state: SiteState::Published,
+        verdict: "valid",
+        is_valid: true,
+        reasons: Vec::new(),
+        remarks: Vec::new(),
+        failure: String::new(),
+        body: Body::Mars,
+        place_rad: None,
+        images: 2,
+        pairs: 1,
+        profiles: 2,
+        ties,
+        footprints: 10,
+        kernels: KernelSetName::default(),
+        configuration_blake3: String::new(),
+        fingerprint: String::new(),
+        version: String::new(),
+    };
+    let rows = CampaignRows {
+        sites: vec![
+            row("a", "MAPPING PHASE", 5),
+            row("b", "", 7),
+            row("c", "MAPPING PHASE", 1),
+        ],
+        ..CampaignRows::default()
+    };
+    let products = CampaignProducts {
+        rows: &rows,
+        summary: &pool_sites("test", &rows),
+        page: "<html></html>",
+    };
+    write_campaign_products(folder, &products).unwrap();
+}
+
+#[test]
+fn tables_of_a_campaign_are_queried_with_their_phases() {
+    let folder = tempfile::tempdir().unwrap();
+    campaign(folder.path());
+    let query = "select phase, sum(ties) as ties from sites group by phase order by phase";
+    let answer = sql(folder.path(), &[query, "--format", "csv"]);
+    assert!(answer.status.success(), "{}", error_of(&answer));
+    let found = String::from_utf8(answer.stdout).unwrap();
+    assert_eq!(found, "phase,ties\nMAPPING PHASE,6\nunknown,7\n");
+    // The other tables have their columns without a row.
+    let answer = sql(
+        folder.path(),
+        &["select before_along_m from pairs", "--format", "csv"],
+    );
+    assert_eq!(answer.stdout, b"before_along_m\n");
+    let answer = sql(folder.path(), &["delete from sites"]);
+    assert!(!answer.status.success());
 }

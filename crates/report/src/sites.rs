@@ -100,7 +100,7 @@ pub fn sites_page(sites: &[SiteLine]) -> Result<String> {
     let budgets: Vec<UncertaintyBudget> = budgets.flat_map(|of| of.budgets.clone()).collect();
     let lead = html! {
         (verdict(overall, &headline, &Markup::default()))
-        div.plots { @for (_, body) in Body::WORDS { (sites_map::figure(body, &places(sites, body))?) } }
+        div.plots { @for (_, body) in Body::WORDS { (sites_map::figure(body, &places(sites, body), sites_map::OF_WINDOWS)?) } }
         (table(sites))
         p { (words) }
         (uncertainty::of_sites(&budgets))

@@ -60,17 +60,21 @@ pub(super) struct Place<'a> {
     pub(super) place_deg: (f64, f64),
 }
 
+/// Marks of sites whose place is that of a window.
+pub(super) const OF_WINDOWS: &str = "Centres of the first windows of the sites; sites whose window is an outline are listed in the table only.";
+
 /// The map; empty without a place.
+///
+/// * `of_sites` – what the marks are, a sentence
 ///
 /// # Errors
 /// A drawing that cannot be made.
-pub(super) fn figure(body: Body, places: &[Place]) -> Result<Markup> {
+pub(super) fn figure(body: Body, places: &[Place], of_sites: &str) -> Result<Markup> {
     if places.is_empty() {
         return Ok(Markup::default());
     }
     let features: Vec<&Feature> = FEATURES.iter().filter(|of| of.body == body).collect();
     let (names, unnamed) = names(places, &features);
-    let of_sites = "Centres of the first windows of the sites; sites whose window is an outline are listed in the table only.";
     let mut words = String::new();
     if !unnamed.is_empty() {
         words = format!(" Not labelled for lack of space: {}.", unnamed.join(", "));
@@ -338,7 +342,7 @@ mod tests {
             tone: Tone::Good,
             place_deg: (longitude_deg, latitude_deg),
         };
-        let svg = figure(Body::Mars, &[site]).unwrap().0;
+        let svg = figure(Body::Mars, &[site], "").unwrap().0;
         let picture = svg.split("base64,").nth(1).unwrap();
         let picture = STANDARD.decode(picture.split('"').next().unwrap()).unwrap();
         let mut reader = png::Decoder::new(std::io::Cursor::new(picture))
@@ -395,8 +399,13 @@ mod tests {
             tone: Tone::Good,
             place_deg: (10.0, 10.0),
         };
-        assert!(figure(Body::Mars, &[site()]).unwrap().0.contains("MEGDR"));
-        let moon = figure(Body::Moon, &[site()]).unwrap().0;
+        assert!(
+            figure(Body::Mars, &[site()], "")
+                .unwrap()
+                .0
+                .contains("MEGDR")
+        );
+        let moon = figure(Body::Moon, &[site()], "").unwrap().0;
         assert!(!moon.contains("<image") && !moon.contains("MEGDR"));
         assert!(moon.contains("with their extent"));
     }

@@ -13,8 +13,19 @@ mod selection;
 mod site_files;
 mod site_rows;
 
+use crate::pds::image_index::IndexedImage;
+
 pub use costs::{Costs, InputSize};
 pub use ended::{End, SiteEnd, SiteTask, run_site_file};
 pub(in crate::flow) use results::is_of_campaign;
-pub use results::{CAMPAIGN, CampaignAnswer, CampaignSite, publish_results};
+pub use results::{CAMPAIGN, CampaignAnswer, publish_results};
 pub use selection::{Campaign, LeftOut, PlannedSite, select_campaign};
+
+/// A site of a campaign.
+#[derive(Debug, Clone)]
+pub struct CampaignSite<'a> {
+    /// Its identifier, which is the name of its folder.
+    pub id: &'a str,
+    /// Its images in the index; those that the index does not have are missing.
+    pub images: Vec<&'a IndexedImage>,
+}

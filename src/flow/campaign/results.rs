@@ -9,12 +9,14 @@ use std::{
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
-use super::site_rows::{SiteRows, of_published, without_products};
+use super::{
+    CampaignSite,
+    site_rows::{SiteRows, of_published, without_products},
+};
 use crate::{
     capabilities::declarations,
     error::{Error, Result},
     flow::PUBLISH,
-    pds::image_index::IndexedImage,
     products::{CAMPAIGN_PAGE, CampaignProducts, PageData, write_campaign_products},
     report::campaign_page,
     stages::pool_sites::{CampaignRows, CampaignSummary, SiteState, pool_sites},
@@ -32,15 +34,6 @@ pub const CAMPAIGN: &str = "campaign";
 const STAGE: &str = "pool_sites";
 /// Sites that are read before their rows are put in order.
 const SITES_AT_ONCE: usize = 64;
-
-/// A site of a campaign.
-#[derive(Debug, Clone)]
-pub struct CampaignSite<'a> {
-    /// Its identifier, which is the name of its folder.
-    pub id: &'a str,
-    /// Its images in the index; those that the index does not have are missing.
-    pub images: Vec<&'a IndexedImage>,
-}
 
 /// What was published.
 #[derive(Debug, Clone, PartialEq)]

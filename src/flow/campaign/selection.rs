@@ -7,8 +7,8 @@ use std::{
 };
 
 use super::{
+    CampaignSite,
     files::{ImageFiles, files_by_product},
-    results::CampaignSite,
 };
 use crate::{
     config::{

@@ -1,6 +1,6 @@
 //! Rows of one site.
 
-use super::results::CampaignSite;
+use super::CampaignSite;
 use crate::{
     body::Body,
     minus::signed,

@@ -176,7 +176,7 @@ fn results<'a>() -> Vec<Column<&'a ImageRow>> {
         result(
             "line_spacing_m",
             Unit::Metre,
-            "mean distance of successive lines on the ground along the boresight (MOC GSD of Shan et al. 2005)",
+            "mean distance of successive lines on the ground along the boresight (GSD of the images in Table 2 of Shan et al. 2005)",
             |of| of.line_spacing_m,
         ),
         result(

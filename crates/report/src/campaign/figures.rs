@@ -7,7 +7,7 @@ use chrono::{Datelike as _, NaiveDate};
 use crate::{
     html::{Markup, Tone, html, paragraph},
     numbers::whole,
-    plots::{Panel, Plot, Series, figure, thinned},
+    plots::{Extent, Panel, Plot, Series, figure, thinned},
     sites_map,
 };
 use areograph_base::{body::Body, error::Result};
@@ -21,7 +21,7 @@ const GROUPS_MAX: usize = 16;
 const BEFORE: usize = 1;
 const AFTER: usize = 0;
 /// Sites up to which each has its name on the map.
-const NAMED_MAX: usize = 40;
+const NAMED_MAX: usize = 12;
 /// Days of a year.
 const YEAR_DAYS: f64 = 365.25;
 
@@ -68,7 +68,25 @@ pub(super) fn misregistration(rows: &CampaignRows) -> Result<Markup> {
     Ok(html! {
         div.plots {
             @for (name, axis, of) in over { (figure(&plot_over(&pairs, name, axis, of))?) }
-            @for (name, axis, of) in groups { (figure(&plot_by(&pairs, name, axis, of))?) }
+            @for (name, axis, of) in groups {
+                @if let Some(plot) = plot_by(&pairs, name, axis, of) { (figure(&plot)?) }
+            }
+        }
+        @for (name, _, of) in groups {
+            @if let Some(only) = only_group(&pairs, of) { p { "All pairs have one " (name) ": " (only) "." } }
+        }
+    })
+}
+
+/// The group of all pairs, if there is one.
+fn only_group(pairs: &[&PairRow], of: fn(&PairRow) -> String) -> Option<String> {
+    let first = of(pairs.first()?);
+    let same = pairs.iter().all(|pair| of(pair) == first);
+    same.then(|| {
+        if first.is_empty() {
+            "none".to_owned()
+        } else {
+            first
         }
     })
 }
@@ -141,7 +159,16 @@ fn plot_over(
     )
 }
 
-fn plot_by(pairs: &[&PairRow], name: &str, axis: &'static str, of: fn(&PairRow) -> String) -> Plot {
+/// `None` for pairs of one group.
+fn plot_by(
+    pairs: &[&PairRow],
+    name: &str,
+    axis: &'static str,
+    of: fn(&PairRow) -> String,
+) -> Option<Plot> {
+    if only_group(pairs, of).is_some() {
+        return None;
+    }
     let names: Vec<String> = pairs.iter().map(|pair| of(pair)).collect();
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     for name in &names {
@@ -170,12 +197,19 @@ fn plot_by(pairs: &[&PairRow], name: &str, axis: &'static str, of: fn(&PairRow) 
         words += &format!(" {} others are at {}.", whole(others), GROUPS_MAX + 1);
     }
     words += &shown(pairs.len());
-    Plot::of(
-        format!("Misregistration by {name}"),
-        words,
-        axis,
-        panels(pairs, &|index, _| Some(number(&names[index]))),
-    )
+    let places = largest.len() + usize::from(others > 0);
+    Some(Plot {
+        x: Extent {
+            low: 0.5,
+            high: places as f64 + 0.5,
+        },
+        ..Plot::of(
+            format!("Misregistration by {name}"),
+            words,
+            axis,
+            panels(pairs, &|index, _| Some(number(&names[index]))),
+        )
+    })
 }
 
 /// The sites on their bodies, by verdict.
@@ -198,7 +232,7 @@ pub(super) fn map(rows: &CampaignRows) -> Result<Markup> {
             })
             .collect();
         let map = if places.len() <= NAMED_MAX {
-            sites_map::figure(body, &places)?
+            sites_map::figure(body, &places, "Centres of the first images of the sites.")?
         } else {
             sites_map::figure_of_many(body, &places)?
         };

@@ -34,9 +34,9 @@ fn images(summary: &CampaignSummary) -> Markup {
     let quantities: [(&str, &Summary, usize); 6] = [
         ("emission, degrees", &of.emission_deg, 2),
         ("exposure, ms", &of.exposure_ms, 4),
-        ("line spacing (MOC GSD), m", &of.line_spacing_m, 2),
+        ("line spacing (GSD of images), m", &of.line_spacing_m, 2),
         ("pixel width, m", &of.pixel_size_m, 2),
-        ("shot spacing (MOLA GSD), m", &of.shot_spacing_m, 1),
+        ("shot spacing (GSD of shots), m", &of.shot_spacing_m, 1),
         ("footprints in the image", &of.footprints_inside, 0),
     ];
     for (name, of, decimals) in quantities {
