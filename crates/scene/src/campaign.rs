@@ -30,7 +30,8 @@ use super::{
     error::SceneError,
     files::{Draft, put},
     kernels::{
-        Flightpath, clock_session, image_start, write_attitude, write_orbits, write_text_kernels,
+        Flightpath, clock_session, image_start, write_attitude, write_orbits, write_planets_of,
+        write_texts,
     },
     mission::{write_as_truth, write_file_of_day},
     plan::{PlannedImage, Site},
@@ -107,7 +108,7 @@ pub fn write_campaign(
     let seed = options.seed;
     let draft = Draft::begin(directory, README)?;
     let kernels = draft.folder("kernels")?;
-    write_text_kernels(&kernels)?;
+    write_texts(&kernels)?;
     let session = clock_session(&kernels)?;
     let plan = CampaignPlan::draw(pairs, singles, seed, &session)?;
     let sites: Vec<Site<'_>> = plan.places.iter().map(plan::Place::site).collect();
@@ -127,10 +128,26 @@ pub fn write_campaign(
         let label = planned_label(arc, PHASES[phase(index)].mission_phase, &session)?;
         put(&labels.join(format!("{}.lbl", arc.image.id)), &label)?;
     }
-    write_attitude(&kernels, &session, &arcs)?;
+    // As in the archive, a phase has kernels of its own.
+    let paths: Vec<Flightpath<'_>> = arcs
+        .iter()
+        .map(|arc| Flightpath::of_arc(arc, seed))
+        .collect();
+    for (number, of) in PHASES.iter().enumerate() {
+        let own: Vec<usize> = (0..arcs.len())
+            .filter(|index| phase(*index) == number)
+            .collect();
+        if own.is_empty() {
+            continue;
+        }
+        let part = of.id.to_ascii_lowercase();
+        let own_arcs: Vec<&Arc<'_>> = own.iter().map(|index| &arcs[*index]).collect();
+        write_attitude(&kernels, &part, &session, &own_arcs)?;
+        let own_paths: Vec<&Flightpath<'_>> = own.iter().map(|index| &paths[*index]).collect();
+        write_orbits(&kernels, &part, &own_paths)?;
+    }
+    write_planets_of(&kernels, &paths)?;
     drop(session);
-    let paths = arcs.iter().map(|arc| Flightpath::of_arc(arc, seed));
-    write_orbits(&kernels, &paths.collect::<Vec<_>>())?;
 
     let errors = CampaignErrors::draw(seed);
     let days: Vec<Flown<'_>> = (0..)

@@ -78,19 +78,37 @@ pub(super) const ARCHIVE_METAKERNEL: &str = "archive.tm";
 /// Margin of an archive's orbit beyond its files, seconds.
 const ARCHIVE_MARGIN_S: f64 = 60.0;
 
+/// Part of a mission that has kernels of its own, as names of files contain it: here, all of it.
+pub(super) const WHOLE: &str = "scene";
+
 /// File name of the orbit of one family.
 pub(super) fn spk_name(family: &str) -> String {
-    format!("mgs_{family}_scene.bsp")
+    spk_name_of(family, WHOLE)
+}
+
+/// File name of the orbit of one family in a part of the mission.
+fn spk_name_of(family: &str, part: &str) -> String {
+    format!("mgs_{family}_{part}.bsp")
 }
 
 /// Writes text kernels and metakernels into `folder`.
 pub(super) fn write_text_kernels(folder: &Path) -> Result<()> {
+    write_texts(folder)?;
+    write_metakernels(folder)
+}
+
+/// Writes text kernels into `folder`.
+pub(super) fn write_texts(folder: &Path) -> Result<()> {
     fs::create_dir_all(folder)
         .map_err(IoError::on("create"))
         .in_file(folder)?;
     for (name, text) in TEXT_KERNELS {
         put(&folder.join(name), text)?;
     }
+    Ok(())
+}
+
+fn write_metakernels(folder: &Path) -> Result<()> {
     for family in FAMILIES {
         let mut names: Vec<String> = TEXT_KERNELS[..LOADED]
             .iter()
@@ -180,9 +198,14 @@ impl AttitudeColumns {
     }
 }
 
-/// Writes the attitude of all arcs: the attitude of true time `t` is stored at `t − 1.15 s`.
-pub(super) fn write_attitude(folder: &Path, session: &Session, arcs: &[Arc]) -> Result<()> {
-    let columns: Vec<AttitudeColumns> = arcs.iter().map(AttitudeColumns::of).collect();
+/// Writes the attitude of arcs of a part of the mission: the attitude of true time `t` is stored at `t − 1.15 s`.
+pub(super) fn write_attitude(
+    folder: &Path,
+    part: &str,
+    session: &Session,
+    arcs: &[&Arc<'_>],
+) -> Result<()> {
+    let columns: Vec<AttitudeColumns> = arcs.iter().map(|arc| AttitudeColumns::of(arc)).collect();
     let segments: Vec<CkSegment> = arcs
         .iter()
         .zip(&columns)
@@ -198,7 +221,12 @@ pub(super) fn write_attitude(folder: &Path, session: &Session, arcs: &[Arc]) -> 
         "{SYNTHETIC}\nTime tags contain the error of the mission's kernels: the attitude of time t \
          is stored at t - 1.15 s."
     );
-    write_ck(&folder.join(CK_NAME), session, &segments, &comment)
+    write_ck(
+        &folder.join(format!("mgs_sc_{part}.bc")),
+        session,
+        &segments,
+        &comment,
+    )
 }
 
 /// An orbit with its rival versions over some time.
@@ -233,7 +261,7 @@ impl<'a> Flightpath<'a> {
 }
 
 /// Writes one SPK per family and one for Mars and the Sun, of paths in order of time.
-pub(super) fn write_orbits(folder: &Path, paths: &[Flightpath<'_>]) -> Result<()> {
+pub(super) fn write_orbits(folder: &Path, part: &str, paths: &[&Flightpath<'_>]) -> Result<()> {
     for (index, family) in FAMILIES.iter().enumerate() {
         let tables: Vec<(Vec<Et>, Vec<State>)> = paths
             .iter()
@@ -261,14 +289,21 @@ pub(super) fn write_orbits(folder: &Path, paths: &[Flightpath<'_>]) -> Result<()
             .collect();
         let comment =
             format!("{SYNTHETIC}\nOrbit of family {family}; family gsfc is the true orbit.");
-        write_spk(&folder.join(spk_name(family)), &segments, &comment)?;
+        write_spk(&folder.join(spk_name_of(family, part)), &segments, &comment)?;
     }
-    match (paths.first(), paths.last()) {
-        (Some(first), Some(last)) => {
-            let span = Interval::new(first.span.start, last.span.stop);
-            write_planets(folder, span.padded(-KERNEL_MARGIN_S))
+    Ok(())
+}
+
+/// Writes Mars and the Sun from the first path to the last.
+pub(super) fn write_planets_of(folder: &Path, paths: &[Flightpath<'_>]) -> Result<()> {
+    let earlier = |a: &Et, b: &Et| a.seconds().total_cmp(&b.seconds());
+    let start = paths.iter().map(|path| path.span.start).min_by(earlier);
+    let stop = paths.iter().map(|path| path.span.stop).max_by(earlier);
+    match start.zip(stop) {
+        Some((start, stop)) => {
+            write_planets(folder, Interval::new(start, stop).padded(-KERNEL_MARGIN_S))
         }
-        _ => Ok(()),
+        None => Ok(()),
     }
 }
 

@@ -13,8 +13,8 @@ use super::{
     further_passes::FurtherPass,
     images::{Coder, write_images},
     kernels::{
-        Flightpath, clock_session, image_start, versions, write_attitude, write_orbits,
-        write_text_kernels,
+        Flightpath, WHOLE, clock_session, image_start, versions, write_attitude, write_orbits,
+        write_planets_of, write_text_kernels,
     },
     laser::{LaserErrors, Shot},
     orbit::Orbit,
@@ -263,7 +263,7 @@ fn write_kernels(
             &planned_label(arc, "EXTENDED", &session)?,
         )?;
     }
-    write_attitude(&kernels, &session, &arcs)?;
+    write_attitude(&kernels, WHOLE, &session, &arcs.iter().collect::<Vec<_>>())?;
     drop(session);
     let last = arcs
         .last()
@@ -274,7 +274,8 @@ fn write_kernels(
         .iter()
         .map(|pass| Flightpath::of_pass(pass, options.seed));
     let paths: Vec<Flightpath<'_>> = of_arcs.chain(of_passes).collect();
-    write_orbits(&kernels, &paths)?;
+    write_orbits(&kernels, WHOLE, &paths.iter().collect::<Vec<_>>())?;
+    write_planets_of(&kernels, &paths)?;
     Ok((arcs, passes))
 }
 

@@ -31,7 +31,12 @@ fn shots(pulses: &[u32]) -> (Footprints<BodyFixed>, Profile) {
 
 fn measured(pulses: &[u32], period_s: Option<f64>, region: Option<&Region>) -> ProfileSpacing {
     let (footprints, profile) = shots(pulses);
-    spacing(&footprints, &profile.rows, period_s, region)
+    spacing(
+        &footprints,
+        &profile.rows,
+        period_s,
+        region.map(std::slice::from_ref),
+    )
 }
 
 #[test]

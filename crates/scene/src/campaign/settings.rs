@@ -21,7 +21,7 @@ pub(super) fn campaign_toml() -> String {
          [pairs]\noverlap_min = 0.3\nconvergence_deg = [4.0, 60.0]\nsun_max_deg = 40.0\npixel_ratio_max = 2.0\n\
          # Tables of tie points state the standard deviations of their measurements.\n\
          ties = \"ties/{{site}}.csv\"\n\n\
-         [kernels]\nmetakernel = \"kernels/{USED_ORBIT}.tm\"\n\n\
+         [kernels]\nroot = \"kernels\"\nspk_family = \"{USED_ORBIT}\"\n\n\
          [pointing]\nck_bias_s = {}\nsource = \"{INJECTED}\"\n\n\
          [altimeter_clock]\nbias_s = {}\nsign = \"late\"\nscope = \"spk_lookup\"\nsource = \"{INJECTED}\"\n\n\
          [pedr]\nfiles = [\"pedr/*.b\"]\ndatum = \"auto\"\n",
@@ -36,8 +36,7 @@ pub(super) const README: &str = "\
 campaign.toml  the campaign: selection from the index, pairs, and the template of the sites
 index/         cumindex.tab with its label: the images, and rows that the selection rejects
 labels/        labels of the images; no pixels
-kernels/       text kernels; orbit (three rival versions), attitude, Mars and Sun as binary kernels;
-               nav.tm, gsfc.tm and ipng.tm load one version of the orbit each with all other kernels
+kernels/       text kernels; orbit (three rival versions) and attitude of each phase, Mars and Sun as binary kernels
 pedr/          a MOLA PEDR file of five minutes around each image; version K refers to IAU 1991, L to IAU 2000
 ties/          tie points of each pair, <first image>_<second image>.csv; some are blunders
 truth.json     true values: errors of images, offsets of phases, misregistration of images and pairs, blunders,

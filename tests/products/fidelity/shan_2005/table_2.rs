@@ -20,7 +20,7 @@ fn each(compare: impl Fn(&'static Printed) -> Comparison) -> Vec<Comparison> {
 }
 
 /// Emission angle at the ground in the middle of the image, as the mission flies it.
-fn flown_emission_deg(image: &Printed) -> f64 {
+fn flown_emission_deg(image: &'static Printed) -> f64 {
     match image.flown().look {
         Look::Roll { emission_deg, .. } => emission_deg,
         Look::Nadir => {
