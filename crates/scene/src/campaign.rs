@@ -30,8 +30,8 @@ use super::{
     error::SceneError,
     files::{Draft, put},
     kernels::{
-        Flightpath, clock_session, image_start, write_attitude, write_orbits, write_planets_of,
-        write_texts,
+        Flightpath, clock_session, image_start, write_attitude, write_metakernels, write_orbits,
+        write_planets_of, write_texts,
     },
     mission::{write_as_truth, write_file_of_day},
     plan::{PlannedImage, Site},
@@ -133,21 +133,25 @@ pub fn write_campaign(
         .iter()
         .map(|arc| Flightpath::of_arc(arc, seed))
         .collect();
-    for (number, of) in PHASES.iter().enumerate() {
-        let own: Vec<usize> = (0..arcs.len())
-            .filter(|index| phase(*index) == number)
-            .collect();
-        if own.is_empty() {
-            continue;
-        }
-        let part = of.id.to_ascii_lowercase();
-        let own_arcs: Vec<&Arc<'_>> = own.iter().map(|index| &arcs[*index]).collect();
-        write_attitude(&kernels, &part, &session, &own_arcs)?;
-        let own_paths: Vec<&Flightpath<'_>> = own.iter().map(|index| &paths[*index]).collect();
-        write_orbits(&kernels, &part, &own_paths)?;
+    let of_phase = |number: usize| (0..arcs.len()).filter(move |index| phase(*index) == number);
+    let parts = PHASES.each_ref().map(|phase| phase.id.to_ascii_lowercase());
+    let parts: Vec<(usize, &str)> = parts.iter().map(|part| &**part).enumerate().collect();
+    let flown = parts
+        .into_iter()
+        .filter(|(number, _)| of_phase(*number).next().is_some());
+    let flown: Vec<(usize, &str)> = flown.collect();
+    for (number, part) in &flown {
+        let own: Vec<&Arc<'_>> = of_phase(*number).map(|index| &arcs[index]).collect();
+        write_attitude(&kernels, part, &session, &own)?;
+    }
+    drop(session);
+    for (number, part) in &flown {
+        let own: Vec<&Flightpath<'_>> = of_phase(*number).map(|index| &paths[index]).collect();
+        write_orbits(&kernels, part, &own)?;
     }
     write_planets_of(&kernels, &paths)?;
-    drop(session);
+    let parts: Vec<&str> = flown.into_iter().map(|(_, part)| part).collect();
+    write_metakernels(&kernels, &parts)?;
 
     let errors = CampaignErrors::draw(seed);
     let days: Vec<Flown<'_>> = (0..)

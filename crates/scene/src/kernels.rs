@@ -33,8 +33,6 @@ const SPK_STEP_S: f64 = 60.0;
 const SPK_DEGREE: i32 = 7;
 /// Name of the kernel with the frames of the wide-angle cameras.
 const WIDE_ANGLE_NAME: &str = "moc_wa.ti";
-/// Name of the attitude kernel.
-const CK_NAME: &str = "mgs_sc_scene.bc";
 /// Name of the kernel with Mars and the Sun.
 const PLANETS_NAME: &str = "mars_sun_scene.bsp";
 /// The first words of every comment area.
@@ -91,10 +89,15 @@ fn spk_name_of(family: &str, part: &str) -> String {
     format!("mgs_{family}_{part}.bsp")
 }
 
+/// File name of the attitude in a part of the mission.
+fn ck_name_of(part: &str) -> String {
+    format!("mgs_sc_{part}.bc")
+}
+
 /// Writes text kernels and metakernels into `folder`.
 pub(super) fn write_text_kernels(folder: &Path) -> Result<()> {
     write_texts(folder)?;
-    write_metakernels(folder)
+    write_metakernels(folder, &[WHOLE])
 }
 
 /// Writes text kernels into `folder`.
@@ -108,17 +111,16 @@ pub(super) fn write_texts(folder: &Path) -> Result<()> {
     Ok(())
 }
 
-fn write_metakernels(folder: &Path) -> Result<()> {
+/// Writes metakernels that load the kernels of these parts of the mission.
+pub(super) fn write_metakernels(folder: &Path, parts: &[&str]) -> Result<()> {
     for family in FAMILIES {
         let mut names: Vec<String> = TEXT_KERNELS[..LOADED]
             .iter()
             .map(|(name, _)| (*name).to_owned())
             .collect();
-        names.extend([
-            PLANETS_NAME.to_owned(),
-            spk_name(family),
-            CK_NAME.to_owned(),
-        ]);
+        names.push(PLANETS_NAME.to_owned());
+        names.extend(parts.iter().map(|part| spk_name_of(family, part)));
+        names.extend(parts.iter().map(|part| ck_name_of(part)));
         put(
             &folder.join(format!("{family}.tm")),
             &metakernel(family, &names),
@@ -221,12 +223,7 @@ pub(super) fn write_attitude(
         "{SYNTHETIC}\nTime tags contain the error of the mission's kernels: the attitude of time t \
          is stored at t - 1.15 s."
     );
-    write_ck(
-        &folder.join(format!("mgs_sc_{part}.bc")),
-        session,
-        &segments,
-        &comment,
-    )
+    write_ck(&folder.join(ck_name_of(part)), session, &segments, &comment)
 }
 
 /// An orbit with its rival versions over some time.
