@@ -3,6 +3,7 @@
 mod advice;
 mod bad_input;
 mod camera_without_sight;
+mod campaign;
 #[path = "../common/mod.rs"]
 mod common;
 mod compare_kernels;
