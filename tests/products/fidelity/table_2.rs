@@ -176,7 +176,7 @@ impl Printed {
     }
 
     /// The same image as the synthetic mission flies it.
-    pub(crate) fn flown(&self) -> &'static PlannedImage {
+    pub(crate) fn flown(&self) -> &'static PlannedImage<'static> {
         IMAGES.iter().find(|image| image.id == self.id).unwrap()
     }
 }
