@@ -287,20 +287,32 @@ impl Cluster<'_> {
     }
 
     /// The tasks of a job that are in the queue, waiting or running.
+    ///
+    /// After a failure of its controller, Slurm may start a task that is running already, and then holds the task until
+    /// somebody releases it: held tasks are released.
     fn queued(&self, job: &str) -> Result<BTreeSet<usize>> {
         let mut squeue = Command::new("squeue");
-        squeue.args(["--noheader", "--array", "--format=%K", "--me"]);
-        squeue.arg(format!("--name=areograph-{}", self.name));
+        squeue.args(["--noheader", "--array", "--format=%K %r", "--me"]);
         squeue.arg(format!("--jobs={job}"));
-        match answer_of("squeue", &mut squeue) {
-            Ok(answer) => Ok(answer
-                .lines()
-                .filter_map(|line| line.trim().parse().ok())
-                .collect()),
+        let answer = match answer_of("squeue", &mut squeue) {
+            Ok(answer) => answer,
             // Slurm forgets a job some minutes after its end.
-            Err(failure) if failure.to_string().contains("Invalid job id") => Ok(BTreeSet::new()),
-            Err(failure) => Err(failure),
+            Err(failure) if failure.to_string().contains("Invalid job id") => String::new(),
+            Err(failure) => return Err(failure),
+        };
+        let mut queued = BTreeSet::new();
+        for line in answer.lines() {
+            let (number, reason) = line.trim().split_once(' ').unwrap_or((line.trim(), ""));
+            let Ok(task) = number.parse() else { continue };
+            queued.insert(task);
+            if reason.to_ascii_lowercase().contains("held") {
+                let mut release = Command::new("scontrol");
+                release.args(["release", &format!("{job}_{task}")]);
+                // The next question tries again.
+                let _ = answer_of("scontrol", &mut release);
+            }
         }
+        Ok(queued)
     }
 
     /// Cancels a job, and waits until its tasks have left the queue; a cluster that does not answer is left alone, since the
