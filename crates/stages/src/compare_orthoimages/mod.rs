@@ -165,7 +165,9 @@ impl Stage for CompareOrthoimages<'_> {
 
 /// Offsets of the second orthoimage against the first; `None` where they have no square in common.
 fn offsets(first: &Orthoimage, second: &Orthoimage) -> Option<OrthoimageOffsets> {
-    let [one, other] = [first, second].map(|of| Raster::of(&of.account.map, &of.brightness));
+    let cells = [first, second].map(|of| of.brightness.bytes());
+    let [one, other] = [(first, &cells[0]), (second, &cells[1])]
+        .map(|(of, cells)| Raster::of(&of.account.map, cells));
     let shift = shift(&one, &other, first.account.cell_m)?;
     let levels = Levels::of([&one, &other], ROOM + shift.factor);
     let pair = Pair {
