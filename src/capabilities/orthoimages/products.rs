@@ -152,6 +152,7 @@ pub(super) fn write_cells<N: Number + Send + Sync>(
         grid,
         parallel_rad,
         body: of.site.config.body,
+        conformal: None,
         what,
         unit: "",
         vertical: "",

@@ -102,6 +102,12 @@ pub struct PlaceOffset {
 }
 
 impl OrthoimageOffsets {
+    /// Those of the second orthoimage against the first; `None` where they have no square in common.
+    #[must_use]
+    pub(crate) fn between(first: &Orthoimage, second: &Orthoimage) -> Option<Self> {
+        offsets(first, second)
+    }
+
     /// Root mean square offset, both axes together, metres; `None` without a place.
     #[must_use]
     pub fn rms_m(&self) -> Option<f64> {

@@ -53,6 +53,8 @@ use blocks::Survey;
 use seams::Set;
 use tile::MapTile;
 
+/// Largest number of orthoimages of a mosaic.
+pub(crate) const ORTHOIMAGES_MAX: usize = Set::MOST;
 /// Rows and columns of the detail around a seam.
 const DETAIL: usize = 240;
 
@@ -155,6 +157,20 @@ enum MosaicError {
 }
 
 impl Mosaic {
+    /// The mosaic of orthoimages, by the distance from the edge of its image, metres, at which an orthoimage shows a place of this longitude and
+    /// latitude; `None` without an orthoimage.
+    ///
+    /// # Errors
+    /// More than [`ORTHOIMAGES_MAX`] orthoimages, too many cells, a stop.
+    pub(crate) fn of(
+        orthoimages: &[Orthoimage],
+        offsets: &[OrthoimageOffsets],
+        inside_m: impl Fn(usize, [f64; 2]) -> f64 + Sync,
+        watch: Watch<'_>,
+    ) -> Result<Option<Self>> {
+        mosaic(orthoimages, offsets, true, inside_m, watch)
+    }
+
     /// Its statistics, which a page shows.
     #[must_use]
     pub fn without_cells(&self) -> Self {
