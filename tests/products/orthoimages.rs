@@ -6,6 +6,7 @@ use std::{collections::BTreeMap, fs::File, path::Path};
 
 use areograph::{
     capabilities::{self, write_products},
+    column::Tiles,
     geom::height_grid::HeightGrid,
     products::{PageData, SiteProducts, listed},
     stage::{Output, Provenance, Round},
@@ -109,7 +110,7 @@ pub(crate) fn orthoimage() -> Orthoimage {
                 brightness: brightness.clone(),
             },
         },
-        brightness,
+        brightness: Tiles::of(SIZE, &brightness),
         sigmas_m: vec![4.25; 12],
     }
 }
@@ -135,7 +136,10 @@ fn mosaic() -> Mosaic {
             look: account.look,
             detail: None,
         },
-        sources: brightness.iter().map(|of| u8::from(*of > 0)).collect(),
+        sources: {
+            let sources = brightness.bytes().into_iter().map(|of| u8::from(of > 0));
+            Tiles::of(SIZE, &sources.collect::<Vec<_>>())
+        },
         brightness,
     }
 }
@@ -197,7 +201,7 @@ fn files_and_page_state_what_was_computed() {
     let DecodingResult::U8(bytes) = decoder.read_image().unwrap() else {
         panic!("other numbers");
     };
-    assert_eq!(bytes, orthoimages[0].brightness);
+    assert_eq!(bytes, orthoimages[0].brightness.bytes());
 
     rasters_are_layers_of_the_project(&folder.path().join("exchange/site.qgz"), &id);
 

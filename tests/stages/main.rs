@@ -11,6 +11,7 @@ mod common;
 mod light_time;
 mod line_times;
 mod match_laser;
+mod net_mosaic;
 mod pds_search;
 mod plane;
 mod registration;

@@ -4,6 +4,7 @@
 //! [`PIECE`] values, compressed without loss to a third or less. All pieces of a process beyond [`MEMORY_BYTES`] lie in
 //! an unnamed temporary file. A value is read by [`Column::at`], which unpacks its piece; every thread keeps the last
 //! pieces that it used. The values behind the last full pieces are not packed, so that small sites pack nothing.
+//! [`Tiles`] hold bytes on a grid in the same way.
 //!
 //! ```
 //! use areograph_base::column::Column;
@@ -15,16 +16,20 @@
 //! ```
 
 mod kept;
+mod tiles;
 mod unpacked;
 
 use std::{fmt, ops::Range, sync::Arc};
 
 use rayon::prelude::*;
-use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-pub use self::kept::{MEMORY_BYTES, lost_values};
 use self::{kept::Kept, unpacked::Unpacked};
-use crate::packed::{self, Packed};
+pub use self::{
+    kept::{MEMORY_BYTES, lost_values},
+    tiles::{TILE, Tile, Tiles, spans},
+};
+use crate::packed::{self, Packed, TakenBytes};
 
 /// Number of values of a piece.
 pub const PIECE: usize = 1 << 14;
@@ -244,9 +249,14 @@ impl<T: Packed> Serialize for Column<T> {
 /// Every piece is unpacked once to verify it; pieces of [`PIECE`] values stay packed, and others are packed anew.
 impl<'de, T: Packed> Deserialize<'de> for Column<T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let damaged = || de::Error::custom(packed::DAMAGED);
-        let bytes = deserializer.deserialize_bytes(packed::Bytes)?;
-        let (count, pieces) = packed::split(&bytes).ok_or_else(damaged)?;
+        deserializer.deserialize_byte_buf(TakenBytes(Self::of_stored))
+    }
+}
+
+impl<T: Packed> Column<T> {
+    /// The column of these stored bytes; `None` if they are damaged.
+    fn of_stored(bytes: &[u8]) -> Option<Self> {
+        let (count, pieces) = packed::split(bytes)?;
         let part = |bytes: &&[u8]| {
             let values: Vec<T> = packed::values(bytes)?;
             Some(if values.len() == PIECE {
@@ -263,16 +273,14 @@ impl<'de, T: Packed> Deserialize<'de> for Column<T> {
         };
         let parts: Option<Vec<Self>> = pieces.par_iter().map(part).collect();
         let mut column = Self::new();
-        for mut part in parts.ok_or_else(damaged)? {
+        for mut part in parts? {
             if column.rest.is_empty() && part.rest.is_empty() {
                 column.pieces.append(&mut part.pieces);
             } else {
                 column.append(&mut part);
             }
         }
-        (column.len() == count)
-            .then_some(column)
-            .ok_or_else(damaged)
+        (column.len() == count).then_some(column)
     }
 }
 

@@ -118,12 +118,8 @@ pub(crate) fn values<T: Packed>(piece: &[u8]) -> Option<Vec<T>> {
 pub fn deserialize<'de, T: Packed, D: Deserializer<'de>>(
     deserializer: D,
 ) -> Result<Vec<T>, D::Error> {
-    let bytes = deserializer.deserialize_bytes(Bytes)?;
-    unpacked(&bytes).ok_or_else(|| de::Error::custom(DAMAGED))
+    deserializer.deserialize_byte_buf(TakenBytes(unpacked))
 }
-
-/// The reason why a stored column is refused.
-pub(crate) const DAMAGED: &str = "a stored column is damaged";
 
 const fn length(count: usize) -> [u8; LENGTH_BYTES] {
     (count as u64).to_le_bytes()
@@ -155,22 +151,18 @@ fn unpacked<T: Packed>(bytes: &[u8]) -> Option<Vec<T>> {
     (values.len() == count).then_some(values)
 }
 
-/// Visitor of bytes; borrows them from a stored output instead of copying them.
-pub(crate) struct Bytes;
+/// Visitor of bytes that makes a value of them, `None` if they are damaged, without a copy of them.
+pub(crate) struct TakenBytes<F>(pub(crate) F);
 
-impl<'de> de::Visitor<'de> for Bytes {
-    type Value = Cow<'de, [u8]>;
+impl<T, F: FnOnce(&[u8]) -> Option<T>> de::Visitor<'_> for TakenBytes<F> {
+    type Value = T;
 
     fn expecting(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
         to.write_str("the bytes of a column")
     }
 
-    fn visit_borrowed_bytes<E>(self, bytes: &'de [u8]) -> Result<Self::Value, E> {
-        Ok(bytes.into())
-    }
-
-    fn visit_bytes<E>(self, bytes: &[u8]) -> Result<Self::Value, E> {
-        Ok(bytes.to_vec().into())
+    fn visit_bytes<E: de::Error>(self, bytes: &[u8]) -> Result<T, E> {
+        self.0(bytes).ok_or_else(|| E::custom("a stored column is damaged"))
     }
 }
 

@@ -129,7 +129,11 @@ declare_table! {
     pub struct PicturesConfig {
         /// Paths or globs of tables (.csv), one row per picture: `picture` and, where known, `brick` (name of the
         /// brick) and `metres_per_unit` (size of a coordinate unit on the ground). This size tests the scale of the
-        /// controls: if the adjusted size differs by more than 2 %, the net is invalid.
+        /// controls: if the adjusted size differs by more than 2 %, the net is invalid. Pictures with an `image` (path of a
+        /// file relative to the table: PNG, TIFF, ISIS cube, or archived image) form a mosaic on the map. `image_x` and `image_y` are the coordinates of the
+        /// outer corner of its first pixel, the upper left one, in the coordinates of the measurements; `pixel_units` is the edge of a pixel in their units (default
+        /// 1). Without `image_x` and `image_y`, the lower left corner of the image (the upper left one if `y_axis` is "down")
+        /// is the origin.
         #[serde(skip)]
         files: Vec<PathBuf> = key(Globs(&["csv"])).or(Vec::new()).unused(r#"["pictures.csv"]"#),
     }
@@ -152,6 +156,9 @@ declare_table! {
     pub struct MapConfig {
         /// The projection.
         map: ConformalMap = group::<MapKeys>().map(MapKeys::map),
+        /// Edge of a cell of the mosaic on the map. The default is the median size of the pixels of the images on the map.
+        #[serde(skip)]
+        cell_m: Option<f64> = key(above_to(0.0, 1e7)).unused("100.0"),
     }
 }
 

@@ -61,6 +61,19 @@ pub struct PictureRow {
     pub brick: String,
     /// Size of a unit on the ground.
     pub metres_per_unit: Option<f64>,
+    /// Its pixels, where there are some.
+    pub image: Option<ImageOfPicture>,
+}
+
+/// The pixels of a picture, and where they lie in its coordinates.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImageOfPicture {
+    /// Path of the file, as the table states it.
+    pub file: String,
+    /// Coordinates of the outer corner of its first pixel; `None` for a corner of the image at the origin.
+    pub corner: Option<Place>,
+    /// Edge of a pixel, units of the picture.
+    pub pixel_units: f64,
 }
 
 /// A tick of the film.
@@ -192,11 +205,14 @@ pub fn read_controls(path: &Path) -> Result<Rows<ControlRow>> {
 /// # Errors
 /// As [`read_measurements`].
 pub fn read_pictures(path: &Path) -> Result<Rows<PictureRow>> {
-    const COLUMNS: &str = "picture, and optionally brick and metres_per_unit";
+    const COLUMNS: &str =
+        "picture, and optionally brick, metres_per_unit, image, image_x, image_y and pixel_units";
     read_rows(path, EXAMPLE, |header| {
         let [picture] = columns(header, ["picture"], COLUMNS)?;
         let place = |name: &str| header.iter().position(|column_name| column_name == name);
         let (brick, size) = (place("brick"), place("metres_per_unit"));
+        let image = place("image");
+        let of_image = ["image_x", "image_y", "pixel_units"].map(place);
         Ok(move |row: &csv::StringRecord| {
             let text =
                 |column: Option<usize>| column.and_then(|at| row.get(at)).unwrap_or_default();
@@ -210,10 +226,31 @@ pub fn read_pictures(path: &Path) -> Result<Rows<PictureRow>> {
                 }
                 _ => None,
             };
+            let number = |column: Option<usize>| {
+                let column = column.filter(|_| !text(column).is_empty());
+                let found = column.map(|column| numbers(row, &[column]));
+                Ok::<_, String>(found.transpose()?.map(|found| found[0]))
+            };
+            let [x, y, pixel_units] = of_image;
+            let corner = match (number(x)?, number(y)?) {
+                (Some(x), Some(y)) => Some(Place::new(x, y)),
+                (None, None) => None,
+                _ => return Err("both image_x and image_y, or neither".to_owned()),
+            };
+            let pixel_units = number(pixel_units)?.unwrap_or(1.0);
+            if !(pixel_units > 0.0) {
+                return Err("pixel_units above 0".to_owned());
+            }
+            let file = text(image);
             Ok(PictureRow {
                 picture: name(row, picture, NAMED)?,
                 brick: text(brick).to_owned(),
                 metres_per_unit,
+                image: (!file.is_empty()).then(|| ImageOfPicture {
+                    file: file.to_owned(),
+                    corner,
+                    pixel_units,
+                }),
             })
         })
     })

@@ -21,7 +21,10 @@ use areograph_base::{
     error::{Locate as _, Result},
     units::RADIANS_PER_DEGREE,
 };
-use areograph_geom::height_grid::HeightGrid;
+use areograph_geom::{
+    conformal_map::{ConformalMap, Projection},
+    height_grid::HeightGrid,
+};
 
 pub use number::Number;
 
@@ -38,6 +41,8 @@ pub struct GeoTiff<'a, N> {
     pub parallel_rad: f64,
     /// The body whose sphere the grid is of.
     pub body: Body,
+    /// The map where it is not equirectangular; then angles of the grid are distances on the map in parts of the radius of the grid.
+    pub conformal: Option<&'a ConformalMap>,
     /// Meaning of the numbers, in words, which readers show as the name of the band.
     pub what: &'a str,
     /// Unit of the numbers, as in `m`; empty without one.
@@ -123,19 +128,61 @@ impl<N: Number + Send + Sync> GeoTiff<'_, N> {
 
     /// Description of the file's data, and its georeference.
     fn fields(&self) -> Vec<Field> {
-        let MapSphere { crs, datum, .. } = self.body.map();
-        let radius_m = self.grid.radius_m;
         let [west_rad, _, _, north_rad] = self.grid.edges_rad();
-        let cell_m = self.grid.cell_rad[1] * radius_m;
-        let place_m = [west_rad * self.parallel_rad.cos(), north_rad].map(|of| of * radius_m);
-        let of_map = format!("Equirectangular {}|", self.body.names().name);
-        let of_sphere = format!("{crs}|");
+        let cell_m = self.grid.cell_rad[1] * self.grid.radius_m;
+        let place_m = [west_rad * self.parallel_rad.cos(), north_rad];
+        let place_m = place_m.map(|of| of * self.grid.radius_m);
+        let MapKeys {
+            sphere,
+            keys,
+            numbers,
+            names,
+        } = self.map_keys();
+        vec![
+            Field::text(270, &format!("{}; {sphere}", self.what)),
+            Field::doubles(33_550, &[cell_m, cell_m, 0.0]),
+            Field::doubles(33_922, &[0.0, 0.0, 0.0, place_m[0], place_m[1], 0.0]),
+            Field::shorts(34_735, &keys.concat()),
+            Field::doubles(34_736, &numbers),
+            Field::text(34_737, &names),
+            Field::text(42_112, &self.metadata()),
+        ]
+    }
+
+    /// The coordinate system.
+    fn map_keys(&self) -> MapKeys {
+        let MapSphere { crs, datum, .. } = self.body.map();
+        let (of_map, of_sphere, sphere, radius_m) = match self.conformal {
+            None => {
+                let radius_m = self.grid.radius_m;
+                (
+                    format!("Equirectangular {}|", self.body.names().name),
+                    format!("{crs}|"),
+                    format!("sphere {datum}, {radius_m} m"),
+                    radius_m,
+                )
+            }
+            Some(map) => {
+                let radius_m = map.radius_m;
+                let name = match map.projection {
+                    Projection::Mercator => "Mercator|",
+                    Projection::Stereographic => "Stereographic|",
+                };
+                let sphere = format!("sphere of {radius_m} m");
+                (name.to_owned(), format!("{sphere}|"), sphere, radius_m)
+            }
+        };
         let of_heights = format!("height above the {}|", self.vertical);
         let (split, end) = (of_map.len(), of_map.len() + of_sphere.len());
         // Map, areas, a name; sphere, its name, degrees, both half-axes, meridian; map, its kind, metres, parallel,
         // longitude.
         let user = 32_767;
-        let keys: [[usize; 4]; 16] = [
+        let kind = match self.conformal.map(|map| map.projection) {
+            None => 17,
+            Some(Projection::Mercator) => 7,
+            Some(Projection::Stereographic) => 14,
+        };
+        let first: [[usize; 4]; 15] = [
             [1, 1, 0, 15],
             [1024, 0, 1, 1],
             [1025, 0, 1, 1],
@@ -149,15 +196,34 @@ impl<N: Number + Send + Sync> GeoTiff<'_, N> {
             [2061, 34_736, 1, 2],
             [3072, 0, 1, user],
             [3073, 34_737, split, 0],
-            [3075, 0, 1, 17],
+            [3075, 0, 1, kind],
             [3076, 0, 1, 9001],
-            [3078, 34_736, 1, 1],
         ];
-        let rest: [[usize; 4]; 3] = [
-            [3082, 34_736, 1, 2],
-            [3083, 34_736, 1, 2],
-            [3088, 34_736, 1, 2],
-        ];
+        let rest: &[[usize; 4]] = match self.conformal.map(|map| map.projection) {
+            // Parallel, false eastings and northings, longitude of the middle.
+            None => &[
+                [3078, 34_736, 1, 1],
+                [3082, 34_736, 1, 2],
+                [3083, 34_736, 1, 2],
+                [3088, 34_736, 1, 2],
+            ],
+            // Parallel of true scale, longitude and latitude of the origin, false eastings and northings.
+            Some(Projection::Mercator) => &[
+                [3078, 34_736, 1, 1],
+                [3080, 34_736, 1, 3],
+                [3081, 34_736, 1, 2],
+                [3082, 34_736, 1, 2],
+                [3083, 34_736, 1, 2],
+            ],
+            // False eastings and northings, longitude and latitude of the centre, scale there.
+            Some(Projection::Stereographic) => &[
+                [3082, 34_736, 1, 2],
+                [3083, 34_736, 1, 2],
+                [3088, 34_736, 1, 3],
+                [3089, 34_736, 1, 1],
+                [3093, 34_736, 1, 4],
+            ],
+        };
         // A vertical system: its own, with a name and a datum, metres.
         let vertical: [[usize; 4]; 4] = [
             [4096, 0, 1, user],
@@ -167,22 +233,34 @@ impl<N: Number + Send + Sync> GeoTiff<'_, N> {
         ];
         let has_vertical = !self.vertical.is_empty();
         let vertical = vertical.into_iter().filter(|_| has_vertical);
-        let mut keys: Vec<[usize; 4]> = keys.into_iter().chain(rest).chain(vertical).collect();
+        let keys = first.into_iter().chain(rest.iter().copied());
+        let mut keys: Vec<[usize; 4]> = keys.chain(vertical).collect();
         // Vertical systems are part of GeoTIFF 1.1.
         keys[0][2] = usize::from(has_vertical);
         keys[0][3] = keys.len() - 1;
-        let numbers = [radius_m, self.parallel_rad / RADIANS_PER_DEGREE, 0.0];
-        let names = of_map + &of_sphere + if has_vertical { &of_heights } else { "" };
-        vec![
-            Field::text(270, &format!("{}; sphere {datum}, {radius_m} m", self.what)),
-            Field::doubles(33_550, &[cell_m, cell_m, 0.0]),
-            Field::doubles(33_922, &[0.0, 0.0, 0.0, place_m[0], place_m[1], 0.0]),
-            Field::shorts(34_735, &keys.concat()),
-            Field::doubles(34_736, &numbers),
-            Field::text(34_737, &names),
-            Field::text(42_112, &self.metadata()),
-        ]
+        let parallel_rad = self
+            .conformal
+            .map_or(self.parallel_rad, |map| map.latitude_rad);
+        let mut numbers = vec![radius_m, parallel_rad / RADIANS_PER_DEGREE, 0.0];
+        if let Some(map) = self.conformal {
+            numbers.extend([map.longitude_rad / RADIANS_PER_DEGREE, 1.0]);
+        }
+        MapKeys {
+            sphere,
+            keys,
+            numbers,
+            names: of_map + &of_sphere + if has_vertical { &of_heights } else { "" },
+        }
     }
+}
+
+/// A coordinate system as GeoTIFF keys, with the numbers and names to which they refer.
+struct MapKeys {
+    /// The sphere, in words.
+    sphere: String,
+    keys: Vec<[usize; 4]>,
+    numbers: Vec<f64>,
+    names: String,
 }
 
 /// Writes a file and reads it back; returns the number of its cells with a number.
@@ -312,6 +390,7 @@ mod tests {
             grid: &grid,
             parallel_rad: 0.2,
             body: Body::Mars,
+            conformal: None,
             what: "numbers",
             unit: "m",
             vertical: "",

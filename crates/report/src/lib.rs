@@ -29,6 +29,7 @@ mod diff;
 pub mod difference;
 mod fidelity;
 mod graticule;
+mod grey;
 mod heights;
 mod html;
 mod image_strips;
@@ -40,6 +41,7 @@ mod matching;
 mod misregistration;
 mod moved;
 mod net;
+mod net_pictures;
 mod notes;
 mod numbers;
 mod offset_arrows;
@@ -94,6 +96,7 @@ pub use terrain_pictures::terrain_pictures;
 /// Parts of sections that are declared outside this crate.
 pub mod parts {
     pub use super::{
+        grey::{grey, stretched},
         html::{Cell, Column, Table, folded_unless, link, paragraph},
         map::globe::globe,
         map::{

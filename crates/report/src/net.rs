@@ -5,14 +5,16 @@ use super::{
     html::{
         Cell, Column, Markup, Section, Table, Tone, counted, html, list, page, paragraph, verdict,
     },
+    net_pictures,
     plots::{
         Arrow, Arrows, Extent, GREY, Panel, Plot, Series, figure, label, magnification, thinned,
     },
 };
 use areograph_base::{error::Result, units::METRES_PER_KM};
 use areograph_config::{Method, NetConfig};
-use areograph_stages::triangulate::{
-    ControlResult, MeasurementResult, ShrinkageResult, Triangulation,
+use areograph_stages::{
+    map_pictures::PicturesOnMap,
+    triangulate::{ControlResult, MeasurementResult, ShrinkageResult, Triangulation},
 };
 
 /// Number of deviations listed.
@@ -20,7 +22,7 @@ const LISTED: usize = 25;
 /// Number of vectors and points drawn.
 const DRAWN: usize = 3_000;
 /// Number of pictures listed.
-const PICTURES: usize = 100;
+const LISTED_CONTROLS: usize = 100;
 /// Share of the map for the longest vector.
 const VECTOR_ROOM: f64 = 0.12;
 /// Width of the axes in a plot's own units, about: both axes are drawn to one scale.
@@ -30,14 +32,19 @@ const AXIS_WIDTH: f64 = 880.0;
 ///
 /// # Errors
 /// A plot that cannot be drawn, which is a bug in areograph.
-pub fn net_page(config: &NetConfig, net: &Triangulation) -> Result<String> {
+pub fn net_page(
+    config: &NetConfig,
+    net: &Triangulation,
+    mosaic: Option<&PicturesOnMap>,
+) -> Result<String> {
     let sections = [
         Section::new("Deviations of the ties", deviations(net)?),
         Section::new("Bricks", bricks(net)),
         Section::new("Blunders and largest deviations", blunders(net)),
         Section::new("Controls", controls(net)?),
         Section::new("Precision and redundancy", precision(config, net)),
-        Section::new("Pictures", pictures(net)),
+        Section::new("Pictures", net_pictures::pictures(net)),
+        Section::new("Mosaic", net_pictures::mosaic(mosaic)?),
     ];
     Ok(page(&config.net, &lead(config, net), &sections))
 }
@@ -331,7 +338,7 @@ fn controls(net: &Triangulation) -> Result<Markup> {
     let mut sorted: Vec<&ControlResult> = net.controls.iter().collect();
     let length = |of: &ControlResult| of.scale_residual_m[0].hypot(of.scale_residual_m[1]);
     sorted.sort_by(|a, b| length(b).total_cmp(&length(a)));
-    for of in sorted.iter().take(PICTURES) {
+    for of in sorted.iter().take(LISTED_CONTROLS) {
         let (x, y) = km(of.given_m);
         let mut cells: Vec<Cell> = vec![(&of.point).into(), label(x, 3).into(), label(y, 3).into()];
         cells.extend(
@@ -407,41 +414,4 @@ fn precision(config: &NetConfig, net: &Triangulation) -> Markup {
         " Standard deviations of points come from the simultaneous weighted adjustment of all pictures and kept controls."
     };
     html! { p { (sigma) (scale) (sigmas) } p { (redundancy) } p { (floor) } }
-}
-
-fn pictures(net: &Triangulation) -> Markup {
-    let mut table = Table::new(
-        "Pictures; full list in pictures.csv",
-        &[
-            Column::Text("picture"),
-            Column::Text("brick"),
-            Column::Number("metres per unit"),
-            Column::Number("angle, °"),
-            Column::Number("X, km"),
-            Column::Number("Y, km"),
-            Column::Number("±, m"),
-            Column::Number("ties"),
-            Column::Number("rms, m"),
-            Column::Number("floor, m"),
-        ],
-    );
-    for of in net.pictures.iter().take(PICTURES) {
-        let (x, y) = km(of.centre_m);
-        let cells: [Cell; 10] = [
-            (&of.picture).into(),
-            (&of.brick).into(),
-            label(of.coefficients[0].hypot(of.coefficients[1]), 4).into(),
-            label(of.angle_rad.to_degrees(), 3).into(),
-            label(x, 3).into(),
-            label(y, 3).into(),
-            of.sigma_m
-                .map_or_else(String::new, |sigma_m| label(sigma_m, 1))
-                .into(),
-            of.ties.to_string().into(),
-            metres(of.deviation_rms_m),
-            label(of.projection_floor_m, 2).into(),
-        ];
-        table.row(true, cells);
-    }
-    table.finish()
 }

@@ -105,9 +105,9 @@ impl Draft {
 }
 
 /// Writes a text file.
-pub(super) fn put(path: &Path, text: &str) -> Result<()> {
+pub(super) fn put(path: &Path, contents: impl AsRef<[u8]>) -> Result<()> {
     File::create(path)
-        .and_then(|mut file| file.write_all(text.as_bytes()))
+        .and_then(|mut file| file.write_all(contents.as_ref()))
         .map_err(IoError::on("write"))
         .in_file(path)
 }

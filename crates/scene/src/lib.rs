@@ -60,6 +60,7 @@ mod pedr;
 pub mod plan;
 mod plane;
 mod plane_net;
+mod plane_pictures;
 mod profile_shift;
 mod pushbroom_pair;
 mod roughness;

@@ -5,8 +5,10 @@ use std::{collections::BTreeMap, fmt::Write as _, path::Path};
 use serde::Serialize;
 
 use super::{
+    error::SceneError,
     files::{Draft, put},
     plane_net::{PlaneRecipe, PlaneScene},
+    plane_pictures::Ground,
     random::Random,
 };
 use areograph_base::error::{Locate, Result};
@@ -14,6 +16,7 @@ use areograph_geom::plane::Place;
 
 const README: &str = "A net of 25 rectified pictures for plane triangulation: measurements, controls and a net file.\n\
     Some measurements and two controls are intentionally wrong; truth.json lists them and all true positions.\n\
+    Nine pictures in the south-west have pixels; truth.json has the brightness of the ground, in which the contrast of pictures differs.\n\
     Next: areograph triangulate net.toml\n";
 
 /// The tertiary net of the paper with more points and controls, and noise.
@@ -27,6 +30,9 @@ const RECIPE: PlaneRecipe = PlaneRecipe {
 /// Number of misidentified ties, and their displacement, metres.
 const BLUNDERS: usize = 3;
 const BLUNDER_M: f64 = 2_000.0;
+/// Columns and rows of the grid, from the south-west on, whose pictures have pixels; contrast of every second one.
+const WITH_PIXELS: usize = 3;
+const CONTRAST: f64 = 0.8;
 /// Errors of two controls in Y, metres, as in the secondary net of the paper.
 const GROSS_M: [f64; 2] = [17_000.0, 19_000.0];
 
@@ -44,6 +50,8 @@ struct Truth {
     points_m: BTreeMap<String, [f64; 2]>,
     /// `P`, `Q`, `A`, `B` of every picture, metres.
     pictures: BTreeMap<String, [f64; 4]>,
+    /// Brightness of the ground in pictures with pixels.
+    ground: Ground,
 }
 
 /// Writes a synthetic net into `directory`, replacing an older scene unless files were added or changed. The same seed
@@ -83,11 +91,39 @@ pub fn write_plane_scene(directory: &Path, seed: u64) -> Result<String> {
             of.at.im / 1e3
         );
     }
-    let mut pictures = "picture,brick,metres_per_unit\n".to_owned();
+    let ground = Ground::new(seed);
+    let images = draft.folder("images")?;
+    let mut pictures =
+        "picture,brick,metres_per_unit,image,image_x,image_y,pixel_units\n".to_owned();
     for (index, way) in scene.pictures.iter().enumerate() {
         // Three bricks of neighbouring columns.
-        let brick = ["west", "middle", "east"][index % RECIPE.grid[0] * 3 / RECIPE.grid[0]];
-        let _infallible = writeln!(pictures, "{},{brick},{:.3}", picture(index), way.scale());
+        let [column, row] = [index % RECIPE.grid[0], index / RECIPE.grid[0]];
+        let brick = ["west", "middle", "east"][column * 3 / RECIPE.grid[0]];
+        let (name, scale) = (picture(index), way.scale());
+        let _infallible = write!(pictures, "{name},{brick},{scale:.3}");
+        if column.max(row) >= WITH_PIXELS {
+            pictures += ",,,,\n";
+            continue;
+        }
+        let middle_m = Place::new(column as f64, row as f64) * RECIPE.spacing_m;
+        let contrast = if (column + row) % 2 == 0 {
+            1.0
+        } else {
+            CONTRAST
+        };
+        let path = images.join(format!("{name}.tif"));
+        let image = ground.picture(way, middle_m, RECIPE.side_m, contrast);
+        let image = image.map_err(|refusal| SceneError::Image {
+            image: name.clone(),
+            error: refusal.to_string(),
+        });
+        let image = image.in_file(&path)?;
+        put(&path, &image.tiff)?;
+        let _infallible = writeln!(
+            pictures,
+            ",images/{name}.tif,{:.6},{:.6},{:.9}",
+            image.corner.re, image.corner.im, image.pixel_units
+        );
     }
     let truth = Truth {
         seed,
@@ -121,6 +157,7 @@ pub fn write_plane_scene(directory: &Path, seed: u64) -> Result<String> {
                 )
             })
             .collect(),
+        ground,
     };
     let truth = serde_json::to_string_pretty(&truth).unwrap_or_default() + "\n";
     for (name, text) in [

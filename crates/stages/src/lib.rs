@@ -24,6 +24,7 @@ pub mod intersect;
 pub mod join_surfaces;
 pub mod judge;
 pub mod lay_overlays;
+pub mod map_pictures;
 pub mod map_surface;
 pub mod match_laser;
 pub mod match_ties;

@@ -4,10 +4,12 @@
 //! are rounded where their formats are. Large ones are hashed when the file system reports a change, and read when a
 //! stage uses them.
 
+mod streamed;
+
 use std::{
     collections::BTreeSet,
     fs::{self, File},
-    io::{BufWriter, ErrorKind, Read, Seek, Write as _},
+    io::{BufWriter, ErrorKind, Read, Seek, SeekFrom, Write as _},
     path::{Path, PathBuf},
     sync::{
         Arc,
@@ -33,6 +35,8 @@ use areograph_base::{
 const READ_AT_ONCE: u64 = 1 << 16;
 /// Bytes of an output that are held in memory before they are written.
 const HELD_BYTES: usize = 1 << 20;
+/// Largest output that is read into memory before its value is made, bytes; the bytes of a larger one are read as its value needs them.
+const IN_MEMORY: u64 = 1 << 24;
 /// Bytes of a file that usually contain its header.
 const HEAD_BYTES: u64 = 1 << 16;
 
@@ -263,6 +267,24 @@ pub(super) fn stored<T: DeserializeOwned>(folder: &Path, label: &str) -> Option<
 
 /// Header and output in the file `path`, if the output has the hash that its header states.
 fn read_intact<T: DeserializeOwned>(path: &Path) -> Option<(Head, T)> {
+    read_intact_within(IN_MEMORY, path)
+}
+
+fn read_intact_within<T: DeserializeOwned>(in_memory: u64, path: &Path) -> Option<(Head, T)> {
+    let mut file = File::open(path).ok()?;
+    let (head, start) = read_head(&mut file)?;
+    if head.payload_bytes > in_memory {
+        file.seek(SeekFrom::Start(start)).ok()?;
+        let mut hasher = blake3::Hasher::new();
+        hasher.update_reader(&mut file).ok()?;
+        let is_intact = *hasher.finalize().to_hex() == *head.blake3;
+        file.seek(SeekFrom::Start(start)).ok()?;
+        let value = is_intact.then(|| streamed::read(file))?;
+        // A type that borrows its bytes needs all of them.
+        if let Some(value) = value {
+            return Some((head, value));
+        }
+    }
     let bytes = fs::read(path).ok()?;
     let (head, payload): (Head, &[u8]) = postcard::take_from_bytes(&bytes).ok()?;
     let intact = *blake3::hash(payload).to_hex() == *head.blake3;
@@ -272,6 +294,13 @@ fn read_intact<T: DeserializeOwned>(path: &Path) -> Option<(Head, T)> {
 
 /// Whether the file contains exactly the stored form of an output.
 fn can_be_read<T: DeserializeOwned>(payload: &mut (impl Read + Seek)) -> bool {
+    let streamed = payload.rewind().ok();
+    if streamed
+        .and_then(|()| streamed::read::<T>(&mut *payload))
+        .is_some()
+    {
+        return true;
+    }
     let mut bytes = Vec::new();
     let all = payload
         .rewind()
@@ -286,129 +315,4 @@ fn read<T: DeserializeOwned>(payload: &[u8]) -> Option<T> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_field_that_documents_leave_out_comes_back() {
-        #[derive(Debug, PartialEq, Serialize, Deserialize)]
-        struct Figure {
-            #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
-            value: Option<f64>,
-            unit: String,
-        }
-        let folder = tempfile::tempdir().unwrap();
-        let cache = StageCache::new(folder.path(), false);
-        let figure = || Figure {
-            value: None,
-            unit: "m".to_owned(),
-        };
-        cache.store("judge", Inputs::new(1), figure()).unwrap();
-        let loaded = cache.load::<Figure>("judge", &Inputs::new(1)).unwrap();
-        assert_eq!(loaded.value().unwrap(), &figure());
-    }
-
-    #[test]
-    fn an_output_is_kept_until_an_input_changes_or_the_file_is_damaged() {
-        let folder = tempfile::tempdir().unwrap();
-        let cache = StageCache::new(folder.path(), false);
-        let inputs = |value: u32| {
-            let mut inputs = Inputs::new(1);
-            inputs.setting("windows", &value);
-            inputs
-        };
-        let why = |cache: &StageCache, value| cache.load::<u32>("search", &inputs(value)).err();
-        assert_eq!(why(&cache, 1), Some(Reason::First));
-        let stored = cache.store("search", inputs(1), 10_u32).unwrap();
-        let loaded = cache.load::<u32>("search", &inputs(1)).unwrap();
-        assert_eq!(loaded.value().unwrap(), &10);
-        assert_eq!(loaded.provenance(), stored.provenance());
-        let changed = Reason::Changed(vec!["key windows changed".to_owned()]);
-        assert_eq!(why(&cache, 2), Some(changed));
-        let path = folder.path().join("search");
-        let mut bytes = fs::read(&path).unwrap();
-        let last = bytes.len() - 1;
-        bytes[last] ^= 1;
-        atomic::write(&path, &bytes).unwrap();
-        assert_eq!(why(&cache, 1), Some(Reason::Damaged));
-        let forced = StageCache::new(folder.path(), true);
-        assert_eq!(why(&forced, 1), Some(Reason::Forced));
-        cache.forget("search");
-        assert_eq!(why(&cache, 1), Some(Reason::First));
-        // An entry that exists and cannot be read.
-        fs::create_dir(&path).unwrap();
-        assert_eq!(why(&cache, 1), Some(Reason::Damaged));
-    }
-
-    #[test]
-    fn a_large_output_is_read_when_it_is_used_and_a_damaged_one_is_noticed() {
-        let folder = tempfile::tempdir().unwrap();
-        let cache = StageCache::new(folder.path(), false).knowing(InputFiles::default());
-        let heights: Vec<u32> = (0..1 << 20).collect();
-        let stored = cache
-            .store("search", Inputs::new(1), heights.clone())
-            .unwrap();
-        let load = || cache.load::<Vec<u32>>("search", &Inputs::new(1)).unwrap();
-        let loaded = load();
-        assert_eq!(loaded.provenance(), stored.provenance());
-        assert_eq!(loaded.value().unwrap(), &heights);
-        let fewer = load().without_rows(|heights| heights.truncate(3));
-        assert_eq!(fewer.value().unwrap(), &[0, 1, 2]);
-        // One bit, after the output was examined and before it is used.
-        let unread = load();
-        let path = folder.path().join("search");
-        let mut bytes = fs::read(&path).unwrap();
-        let middle = bytes.len() / 2;
-        bytes[middle] ^= 1;
-        atomic::write(&path, &bytes).unwrap();
-        assert!(!cache.has_lost_output());
-        let lost = unread.value().unwrap_err().to_string();
-        assert!(cache.has_lost_output() && unread.get().is_none());
-        assert!(
-            lost.contains("the stored output of search is damaged"),
-            "{lost}"
-        );
-        // The file remains; whoever reads all outputs at once identifies it.
-        let at_once = StageCache::new(folder.path(), false);
-        let damaged = at_once.load::<Vec<u32>>("search", &Inputs::new(1));
-        assert_eq!(damaged.err(), Some(Reason::Damaged));
-    }
-
-    #[test]
-    fn an_output_that_a_power_failure_left_incomplete_is_damaged() {
-        let folder = tempfile::tempdir().unwrap();
-        let heights: Vec<u32> = (0..1 << 16).collect();
-        let cache = StageCache::new(folder.path(), false);
-        cache.store("search", Inputs::new(1), heights).unwrap();
-        let path = folder.path().join("search");
-        let whole = fs::read(&path).unwrap();
-        let half = whole.len() / 2;
-        let zeros = |kept: usize| [&whole[..kept], &vec![0; whole.len() - kept]].concat();
-        let left = [Vec::new(), whole[..half].to_vec(), zeros(half), zeros(0)];
-        for bytes in left {
-            atomic::write(&path, &bytes).unwrap();
-            // Read at once, and on demand.
-            let on_demand = StageCache::new(folder.path(), false).knowing(InputFiles::default());
-            for cache in [&cache, &on_demand] {
-                // Zeros are a header of other inputs: whatever the reason, the stage runs.
-                let loaded = cache.load::<Vec<u32>>("search", &Inputs::new(1));
-                assert!(loaded.is_err());
-            }
-            assert_eq!(stored::<Vec<u32>>(folder.path(), "search"), None);
-        }
-    }
-
-    #[test]
-    fn a_large_head_is_read_in_pieces() {
-        let folder = tempfile::tempdir().unwrap();
-        let cache = StageCache::new(folder.path(), false);
-        let mut inputs = Inputs::new(1);
-        for image in 0..10_000 {
-            inputs.setting(&format!("image {image}"), &image);
-        }
-        cache.store("publish", inputs.clone(), 7_u32).unwrap();
-        assert!(fs::metadata(folder.path().join("publish")).unwrap().len() > 2 * HEAD_BYTES);
-        let loaded = cache.load::<u32>("publish", &inputs).unwrap();
-        assert_eq!(loaded.value().unwrap(), &7);
-    }
-}
+mod tests;

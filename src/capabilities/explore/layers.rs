@@ -10,6 +10,7 @@ use crate::{
         orthoimages::{best_mosaic, mosaic_before},
         terrain::significant_surface,
     },
+    column::Tiles,
     error::Result,
     geom::height_grid::HeightGrid,
     products::SiteProducts,
@@ -55,6 +56,8 @@ pub(super) enum LayerPlace {
 pub(super) enum Pixels<'a> {
     /// Brightness, row by row, 0 where there is none; shown as black and as white.
     Grey(Cow<'a, [u8]>, [u8; 2]),
+    /// The same in tiles, of which few are in memory.
+    Tiles(&'a Tiles, [u8; 2]),
     /// A complete file, which lies below other layers of the map.
     Png(Vec<u8>),
 }
@@ -105,8 +108,14 @@ impl Layer<'_> {
     }
 
     fn has_pixels(&self, part: &Part) -> bool {
-        let Pixels::Grey(pixels, _) = &self.pixels else {
-            return true;
+        let pixels = match &self.pixels {
+            Pixels::Grey(pixels, _) => pixels,
+            Pixels::Tiles(tiles, _) => {
+                let [rows, columns] = [part.rows, part.columns].map(|[from, to]| from..to);
+                let own = tiles.filled_window(&rows, &columns);
+                return own.is_some_and(|own| own.iter().any(|pixel| *pixel > 0));
+            }
+            Pixels::Png(_) => return true,
         };
         let mut rows = part.rows[0]..part.rows[1];
         rows.any(|row| {
@@ -252,14 +261,14 @@ fn mosaic_layer<'a>(frame: &MapFrame, of: &'a Mosaic, [suffix, when]: [&str; 2])
 fn on_map<'a>(
     frame: &MapFrame,
     [name, title]: [String; 2],
-    (grid, brightness): (&HeightGrid, &'a [u8]),
+    (grid, brightness): (&HeightGrid, &'a Tiles),
     look: &OrthoimageLook,
 ) -> Layer<'a> {
     Layer {
         name,
         title,
         place: LayerPlace::Map(edges_m(frame, grid)),
-        pixels: Pixels::Grey(brightness.into(), stretch(&look.brightness)),
+        pixels: Pixels::Tiles(brightness, stretch(&look.brightness)),
         size: grid.size,
     }
 }

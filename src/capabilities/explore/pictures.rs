@@ -13,13 +13,24 @@ impl Layer<'_> {
     pub(super) fn png(&self, part: &Part) -> Result<Vec<u8>> {
         match &self.pixels {
             Pixels::Png(file) => Ok(file.clone()),
-            Pixels::Grey(pixels, range) => {
-                let grey = self.reduced(pixels, part, *range);
-                let [rows, columns] = [part.rows, part.columns]
-                    .map(|[from, to]| u32::try_from((to - from).div_ceil(part.step)));
-                let (rows, columns) = (rows.unwrap_or(0), columns.unwrap_or(0));
-                let file = encoded(&grey, columns, rows);
-                Ok(file.map_err(ProductError::refused("draw a picture"))?)
+            Pixels::Grey(pixels, range) => drawn(part, &self.reduced(pixels, part, *range)),
+            Pixels::Tiles(tiles, range) => {
+                let span = |axis: usize, [from, to]: [usize; 2]| from..self.size[axis].min(to);
+                let (rows, columns) = (span(0, part.rows), span(1, part.columns));
+                let own = Layer {
+                    name: String::new(),
+                    title: String::new(),
+                    place: self.place,
+                    size: [rows.len(), columns.len()],
+                    pixels: Pixels::Grey(tiles.window(&rows, &columns).into(), *range),
+                };
+                let part = Part {
+                    file: String::new(),
+                    rows: [0, part.rows[1] - part.rows[0]],
+                    columns: [0, part.columns[1] - part.columns[0]],
+                    step: part.step,
+                };
+                own.png(&part)
             }
         }
     }
@@ -51,6 +62,14 @@ impl Layer<'_> {
     }
 }
 
+/// The file of a part with these greys.
+fn drawn(part: &Part, grey: &[u8]) -> Result<Vec<u8>> {
+    let [rows, columns] = [part.rows, part.columns]
+        .map(|[from, to]| u32::try_from((to - from).div_ceil(part.step)).unwrap_or(0));
+    let file = encoded(grey, columns, rows);
+    Ok(file.map_err(ProductError::refused("draw a picture"))?)
+}
+
 /// A brightness from 1 on.
 #[allow(
     clippy::cast_possible_truncation,
@@ -78,17 +97,21 @@ fn encoded(grey: &[u8], columns: u32, rows: u32) -> std::result::Result<Vec<u8>,
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::capabilities::explore::layers::LayerPlace;
+    use crate::{capabilities::explore::layers::LayerPlace, column::Tiles};
 
     #[test]
     fn squares_have_the_mean_of_their_known_pixels() {
-        let layer = Layer {
+        let layer = |pixels| Layer {
             name: String::new(),
             title: String::new(),
             place: LayerPlace::Map([0.0; 4]),
-            pixels: Pixels::Grey((&[1, 0, 0, 255, 0, 0][..]).into(), [1, 255]),
+            pixels,
             size: [2, 3],
         };
+        let bytes = [1, 0, 0, 255, 0, 0];
+        let tiles = Tiles::of([2, 3], &bytes);
+        let in_tiles = layer(Pixels::Tiles(&tiles, [1, 255]));
+        let layer = layer(Pixels::Grey((&bytes[..]).into(), [1, 255]));
         let part = Part {
             file: String::new(),
             rows: [0, 2],
@@ -96,6 +119,7 @@ mod tests {
             step: 2,
         };
         let file = layer.png(&part).unwrap();
+        assert_eq!(in_tiles.png(&part).unwrap(), file);
         let mut reader = png::Decoder::new(std::io::Cursor::new(file))
             .read_info()
             .unwrap();

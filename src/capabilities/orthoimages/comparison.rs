@@ -3,7 +3,6 @@
 use maud::{Markup, html};
 
 use super::{
-    grey::{grey, stretched},
     mosaic,
     products::{self, Offsets, Pair, offsets},
 };
@@ -12,7 +11,7 @@ use crate::{
     products::SiteProducts,
     report::{
         self,
-        parts::{Cell, Column, Table, label, link, picture_of, signed, whole},
+        parts::{Cell, Column, Table, grey, label, link, picture_of, signed, stretched, whole},
     },
     stage::Round,
     stages::mosaic_images::{MosaicAccount, MosaicDetail},

@@ -2,7 +2,6 @@
 //! (`stages/mosaic_images`): files, section of the page.
 
 mod comparison;
-mod grey;
 mod mosaic;
 mod products;
 mod section;

@@ -132,7 +132,7 @@ fn write_brightness(path: &Path, of: &Context, mosaic: Option<&Mosaic>) -> Resul
     else {
         return Ok(0);
     };
-    let numbers = ("brightness of a mosaic", &**brightness);
+    let numbers = ("brightness of a mosaic", &*brightness.bytes());
     write_cells(path, of, (&account.map, account.parallel_rad), numbers)?;
     Ok(cells(account))
 }
@@ -144,7 +144,7 @@ fn write_sources(path: &Path, of: &Context, mosaic: Option<&Mosaic>) -> Result<u
     else {
         return Ok(0);
     };
-    let labels: Vec<Label> = sources.iter().copied().map(Label).collect();
+    let labels: Vec<Label> = sources.bytes().into_iter().map(Label).collect();
     let numbers = (
         "number of the image of a cell, as listed in mosaic.json",
         &*labels,

@@ -136,13 +136,8 @@ fn has_orthoimage(site: &SiteProducts, image: usize) -> bool {
 fn write_brightness(path: &Path, of: &Context, image: &Orthoimage) -> Result<u64> {
     let account = &image.account;
     let what = "brightness of an image";
-    let numbers = &*image.brightness;
-    write_cells(
-        path,
-        of,
-        (&account.map, account.parallel_rad),
-        (what, numbers),
-    )?;
+    let map = (&account.map, account.parallel_rad);
+    write_cells(path, of, map, (what, &*image.brightness.bytes()))?;
     Ok(u64::from(account.filled))
 }
 
@@ -157,6 +152,7 @@ pub(super) fn write_cells<N: Number + Send + Sync>(
         grid,
         parallel_rad,
         body: of.site.config.body,
+        conformal: None,
         what,
         unit: "",
         vertical: "",

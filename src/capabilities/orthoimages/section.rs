@@ -4,7 +4,6 @@ use maud::{Markup, html};
 
 use super::{
     comparison,
-    grey::{grey, stretched},
     products::{has_orthoimages, orthoimages},
 };
 use crate::{
@@ -12,7 +11,7 @@ use crate::{
     products::SiteProducts,
     report::{
         Section,
-        parts::{Cell, Column, Table, label, link, picture_of, whole},
+        parts::{Cell, Column, Table, grey, label, link, picture_of, stretched, whole},
     },
     stages::rectify_images::{Orthoimage, OrthoimageAccount},
 };

@@ -39,6 +39,7 @@ pub(super) static PAIRS: Declaration = Declaration {
                 grid: &model.heights,
                 parallel_rad: model.parallel_rad,
                 body: of.site.config.body,
+                conformal: None,
                 what: "contributing pairs, sum of 2^bit as in surface.json",
                 unit: "",
                 vertical: "",

@@ -151,6 +151,7 @@ fn write_of<N: Number + Send + Sync>(
         grid: &relief.grid,
         parallel_rad: relief.surface.model.parallel_rad,
         body: of.site.config.body,
+        conformal: None,
         what: band.what,
         unit: band.unit,
         vertical: "",

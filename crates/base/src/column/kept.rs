@@ -92,6 +92,14 @@ impl Kept {
         }
     }
 
+    /// Number of bytes.
+    pub(super) const fn length(&self) -> usize {
+        match &self.place {
+            Place::Memory(bytes) => bytes.len(),
+            Place::File { length, .. } => *length,
+        }
+    }
+
     /// The bytes; the task ends if the file does not return them.
     pub(super) fn bytes(&self) -> Cow<'_, [u8]> {
         match &self.place {

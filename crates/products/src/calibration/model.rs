@@ -95,6 +95,7 @@ fn raster<'a>(
         grid: &surface.heights,
         parallel_rad: surface.parallel_rad,
         body: of.config.body,
+        conformal: None,
         what,
         unit: "m",
         vertical: "",

@@ -14,7 +14,10 @@ use std::{
     path::{Component, Path},
 };
 
-use areograph_base::error::{Locate as _, Result};
+use areograph_base::{
+    column::Tiles,
+    error::{Locate as _, Result},
+};
 use areograph_stages::{map_surface::Surface, mosaic_images::Mosaic, rectify_images::Orthoimage};
 use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter, write::SimpleFileOptions};
 
@@ -346,11 +349,8 @@ fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
     clippy::cast_sign_loss,
     reason = "cells are counted"
 )]
-fn stretch(brightness: &[u8]) -> [u8; 2] {
-    let mut counts = [0_u64; 256];
-    for value in brightness {
-        counts[usize::from(*value)] += 1;
-    }
+fn stretch(brightness: &Tiles) -> [u8; 2] {
+    let counts = brightness.counts();
     let filled: u64 = counts[1..].iter().sum();
     STRETCH.map(|share| {
         let wanted = (share * filled as f64) as u64;
@@ -380,8 +380,8 @@ mod tests {
     fn empty_cells_do_not_change_the_stretch() {
         let mut brightness = vec![0; 10_000];
         brightness.extend(100..=199);
-        assert_eq!(stretch(&brightness), [102, 198]);
-        assert_eq!(stretch(&[0, 0]), [255, 255]);
+        assert_eq!(stretch(&Tiles::of([101, 100], &brightness)), [102, 198]);
+        assert_eq!(stretch(&Tiles::of([1, 2], &[0, 0])), [255, 255]);
     }
 
     #[test]

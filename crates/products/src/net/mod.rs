@@ -3,6 +3,7 @@
 mod controls;
 mod deviations;
 mod document;
+mod mosaic;
 mod pictures;
 mod points;
 
@@ -20,7 +21,7 @@ use super::{
 };
 use areograph_base::{error::Result, schema::DocumentSchema};
 use areograph_config::NetConfig;
-use areograph_stages::triangulate::Triangulation;
+use areograph_stages::{map_pictures::PicturesOnMap, triangulate::Triangulation};
 
 /// Inputs of the products of a net.
 #[derive(Debug, Clone, Copy)]
@@ -29,6 +30,8 @@ pub struct NetProducts<'a> {
     pub config: &'a NetConfig,
     /// The triangulated net.
     pub result: &'a Triangulation,
+    /// Its pictures on the map; `None` without an image.
+    pub mosaic: Option<&'a PicturesOnMap>,
     /// The report.
     pub page: &'a str,
 }
@@ -53,6 +56,10 @@ static PRODUCTS: &[&Declaration<WriteNet>] = &[
     &REPORT,
 ];
 
+/// The products of a net with images.
+static OF_IMAGES: &[&Declaration<WriteNet>] =
+    &[&mosaic::MOSAIC, &mosaic::SOURCES, &mosaic::DOCUMENT];
+
 static REPORT: Declaration<WriteNet> = Declaration::report("the report of the net", |path, of| {
     write_text(path, of.page).map(|()| 0)
 });
@@ -64,7 +71,7 @@ pub(super) fn group() -> Group {
         source: "`areograph triangulate`, in the folder of the net",
         prefix: "net",
         placeholders: "",
-        products: described(PRODUCTS),
+        products: [described(PRODUCTS), described(OF_IMAGES)].concat(),
     }
 }
 
@@ -85,7 +92,16 @@ static COLUMNS: Declaration<WriteNet> = Declaration {
 /// [`Kind::Io`](areograph_base::error::Kind::Io) for errors of the disk; [`Kind::Bug`](areograph_base::error::Kind::Bug) for numbers that
 /// are not finite and files that read back differently.
 pub fn write_net_products(directory: &Path, net: &NetProducts) -> Result<Vec<Product>> {
-    write_each(directory, PRODUCTS, |write, path| write(path, net))
+    let write = |declarations| {
+        write_each(directory, declarations, |write: &WriteNet, path| {
+            write(path, net)
+        })
+    };
+    let mut products = write(PRODUCTS)?;
+    if net.mosaic.is_some() {
+        products.extend(write(OF_IMAGES)?);
+    }
+    Ok(products)
 }
 
 /// Writes a table as Parquet with its metadata.

@@ -102,6 +102,12 @@ pub struct PlaceOffset {
 }
 
 impl OrthoimageOffsets {
+    /// Those of the second orthoimage against the first; `None` where they have no square in common.
+    #[must_use]
+    pub(crate) fn between(first: &Orthoimage, second: &Orthoimage) -> Option<Self> {
+        offsets(first, second)
+    }
+
     /// Root mean square offset, both axes together, metres; `None` without a place.
     #[must_use]
     pub fn rms_m(&self) -> Option<f64> {
@@ -165,7 +171,9 @@ impl Stage for CompareOrthoimages<'_> {
 
 /// Offsets of the second orthoimage against the first; `None` where they have no square in common.
 fn offsets(first: &Orthoimage, second: &Orthoimage) -> Option<OrthoimageOffsets> {
-    let [one, other] = [first, second].map(|of| Raster::of(&of.account.map, &of.brightness));
+    let cells = [first, second].map(|of| of.brightness.bytes());
+    let [one, other] = [(first, &cells[0]), (second, &cells[1])]
+        .map(|(of, cells)| Raster::of(&of.account.map, cells));
     let shift = shift(&one, &other, first.account.cell_m)?;
     let levels = Levels::of([&one, &other], ROOM + shift.factor);
     let pair = Pair {

@@ -85,7 +85,9 @@ fn coarse_cells_lead_to_the_offsets_of_one_window() {
     });
     // Cells of half a metre: errors of a kilometre are 63 reduced cells of 32.
     one.account.cell_m = 0.5;
-    let [first, second] = [&one, &other].map(|of| Raster::of(&of.account.map, &of.brightness));
+    let cells = [&one, &other].map(|of| of.brightness.bytes());
+    let [first, second] = [(&one, &cells[0]), (&other, &cells[1])]
+        .map(|(of, cells)| Raster::of(&of.account.map, cells));
     let shift = shift(&first, &second, 0.5).unwrap();
     let reach = ROOM + shift.factor;
     assert_eq!(reach, 75);

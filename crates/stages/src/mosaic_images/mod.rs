@@ -4,8 +4,9 @@
 //! has the brightness of its image, changed by the gain and the offset of that image if tones are balanced. Where the image of
 //! a block lacks a cell, the first image that has it supplies it; where none has it, the cell stays empty.
 //!
-//! Besides the mosaic, two bytes for each cell, memory is bounded by the number of blocks; tones and seams are found in one
-//! pass over strips of blocks, and the mosaic is written in a second.
+//! Memory does not grow with the number of orthoimages: it contains what they show in the tiles at work (`tile.rs`), the blocks, and one byte
+//! for each cell while statistics are made of the sources. Tones are found in one pass over the tiles, seams in a second, and the mosaic
+//! is composed in a third.
 
 #![allow(
     clippy::cast_possible_wrap,
@@ -15,8 +16,9 @@
 mod balance;
 mod blocks;
 mod seams;
+mod tile;
 
-use std::sync::atomic::AtomicBool;
+use std::{ops::Range, sync::atomic::AtomicBool};
 
 use nalgebra::Vector2;
 use rayon::prelude::*;
@@ -31,6 +33,7 @@ use super::{
     site_image::SiteImages,
 };
 use areograph_base::{
+    column::{Tile, Tiles, spans},
     error::{Cause, Result},
     watch::Watch,
 };
@@ -48,7 +51,10 @@ use areograph_store::{
 use balance::Tone;
 use blocks::Survey;
 use seams::Set;
+use tile::MapTile;
 
+/// Largest number of orthoimages of a mosaic.
+pub(crate) const ORTHOIMAGES_MAX: usize = Set::MOST;
 /// Rows and columns of the detail around a seam.
 const DETAIL: usize = 240;
 
@@ -75,11 +81,11 @@ stage_inputs! {
 pub struct Mosaic {
     /// Statistics.
     pub account: MosaicAccount,
-    /// Brightness, row by row; 0 where there is none.
-    pub brightness: Vec<u8>,
+    /// Brightness; 0 where there is none.
+    pub brightness: Tiles,
     /// Number of the orthoimage that a cell is taken from, from 1, in the order of [`MosaicAccount::images`]; 0 for an empty
     /// cell.
-    pub sources: Vec<u8>,
+    pub sources: Tiles,
 }
 
 /// Statistics of a mosaic.
@@ -151,20 +157,34 @@ enum MosaicError {
 }
 
 impl Mosaic {
+    /// The mosaic of orthoimages, by the distance from the edge of its image, metres, at which an orthoimage shows a place of this longitude and
+    /// latitude; `None` without an orthoimage.
+    ///
+    /// # Errors
+    /// More than [`ORTHOIMAGES_MAX`] orthoimages, too many cells, a stop.
+    pub(crate) fn of(
+        orthoimages: &[Orthoimage],
+        offsets: &[OrthoimageOffsets],
+        inside_m: impl Fn(usize, [f64; 2]) -> f64 + Sync,
+        watch: Watch<'_>,
+    ) -> Result<Option<Self>> {
+        mosaic(orthoimages, offsets, true, inside_m, watch)
+    }
+
     /// Its statistics, which a page shows.
     #[must_use]
     pub fn without_cells(&self) -> Self {
         Self {
             account: self.account.clone(),
-            brightness: Vec::new(),
-            sources: Vec::new(),
+            brightness: Tiles::default(),
+            sources: Tiles::default(),
         }
     }
 }
 
 impl Stage for MosaicImages<'_> {
     const NAME: &'static str = "mosaic_images";
-    const METHOD: u32 = 2;
+    const METHOD: u32 = 3;
     type Output = Option<Mosaic>;
     stage_inputs!(fingerprint);
 
@@ -236,18 +256,16 @@ fn mosaic(
     let labels = survey.blocks.labels();
     let tables: Vec<[u8; 256]> = survey.tones.iter().map(Tone::table).collect();
     let cells = composed(&map, orthoimages, (&labels, survey.edge), &tables, watch)?;
-    let mut counts = [0_u32; 256];
-    for source in &cells.sources {
-        counts[usize::from(*source)] += 1;
-    }
+    let counts = cells.sources.counts();
     let parts = orthoimages.iter().zip(&survey.tones).zip(&counts[1..]);
     let parts = parts.map(|((of, tone), cells)| MosaicPart {
         image: of.account.image,
         tone: [tone.gain, tone.offset],
-        cells: *cells,
+        cells: u32::try_from(*cells).unwrap_or(u32::MAX),
     });
     let parts: Vec<MosaicPart> = parts.collect();
-    let sources = Raster::of(&map, &cells.sources);
+    let sources = cells.sources.bytes();
+    let sources = Raster::of(&map, &sources);
     let account = MosaicAccount {
         parallel_rad: first.parallel_rad,
         cell_m: first.cell_m,
@@ -256,8 +274,8 @@ fn mosaic(
             .filter_map(|pair| seam(pair, &parts, &sources))
             .collect(),
         images: parts,
-        look: OrthoimageLook::of(map.size, &cells.brightness),
-        detail: detail(&sources, &cells.brightness),
+        look: OrthoimageLook::of(&cells.brightness),
+        detail: detail(&sources, &cells),
         map,
     };
     Ok(Some(Mosaic {
@@ -310,10 +328,10 @@ fn common_map(orthoimages: &[Orthoimage]) -> std::result::Result<Option<HeightGr
     }))
 }
 
-/// Cells of a mosaic, row by row.
+/// Cells of a mosaic.
 struct Composed {
-    brightness: Vec<u8>,
-    sources: Vec<u8>,
+    brightness: Tiles,
+    sources: Tiles,
 }
 
 /// Every cell from the orthoimage of its block.
@@ -324,43 +342,40 @@ fn composed(
     tables: &[[u8; 256]],
     watch: Watch<'_>,
 ) -> Result<Composed> {
-    let [rows, columns] = map.size;
-    let across = columns.div_ceil(edge);
+    let across = map.size[1].div_ceil(edge);
     let first = first_cell(map);
-    let rasters = orthoimages
-        .iter()
-        .map(|of| Raster::of(&of.account.map, &of.brightness));
-    let rasters: Vec<Raster<'_>> = rasters.collect();
-    let mut made = Composed {
-        brightness: vec![0; rows * columns],
-        sources: vec![0; rows * columns],
-    };
-    let lines = made
-        .brightness
-        .par_chunks_mut(columns)
-        .zip(made.sources.par_chunks_mut(columns))
-        .enumerate();
-    lines
-        .try_for_each(|(row, (brightness, sources))| {
-            watch.check()?;
-            let cells = brightness.iter_mut().zip(sources).enumerate();
-            for (column, (brightness, source)) in cells {
-                let cell = [first[0] + row as i64, first[1] + column as i64];
-                let label = labels[row / edge * across + column / edge];
-                let own = rasters.get(usize::from(label)).map(|of| of.at(cell));
-                let other = || {
-                    let mut others = (0_u8..).zip(rasters.iter().map(|of| of.at(cell)));
-                    others.find(|(_, pixel)| *pixel > 0)
-                };
-                let own = own.filter(|pixel| *pixel > 0).map(|pixel| (label, pixel));
-                if let Some((of, pixel)) = own.or_else(other) {
-                    *brightness = tables[usize::from(of)][usize::from(pixel)];
-                    *source = of + 1;
-                }
+    let of_tile = |span: [Range<usize>; 2]| {
+        watch.check()?;
+        let tile = MapTile::of(orthoimages, first, span);
+        let [rows, columns] = &tile.span;
+        let mut brightness = vec![0; rows.len() * columns.len()];
+        let mut sources = brightness.clone();
+        let cells = rows
+            .clone()
+            .flat_map(|row| columns.clone().map(move |column| [row, column]));
+        let made = brightness.iter_mut().zip(&mut sources);
+        for (cell, ([row, column], (brightness, source))) in cells.zip(made).enumerate() {
+            let label = labels[row / edge * across + column / edge];
+            let pixel = |of: u8| (of, tile.at(usize::from(of), cell));
+            let own = (usize::from(label) < orthoimages.len()).then(|| pixel(label));
+            let other = || {
+                let mut others = (0_u8..).zip(orthoimages).map(|(of, _)| pixel(of));
+                others.find(|(_, pixel)| *pixel > 0)
+            };
+            if let Some((of, pixel)) = own.filter(|(_, pixel)| *pixel > 0).or_else(other) {
+                *brightness = tables[usize::from(of)][usize::from(pixel)];
+                *source = of + 1;
             }
-            Ok(())
-        })
-        .map(|()| made)
+        }
+        Ok((Tile::of(brightness), Tile::of(sources)))
+    };
+    let tiles = spans(map.size).into_par_iter().map(of_tile);
+    let tiles: Vec<(Tile, Tile)> = tiles.collect::<Result<_>>()?;
+    let (brightness, sources) = tiles.into_iter().unzip();
+    Ok(Composed {
+        brightness: Tiles::of_tiles(map.size, brightness),
+        sources: Tiles::of_tiles(map.size, sources),
+    })
 }
 
 /// Places of a pair whose squares its seam crosses; `None` without one.
@@ -395,7 +410,7 @@ fn seam(
 }
 
 /// The cells around the seam that is nearest to the middle.
-fn detail(sources: &Raster<'_>, brightness: &[u8]) -> Option<MosaicDetail> {
+fn detail(sources: &Raster<'_>, cells: &Composed) -> Option<MosaicDetail> {
     let [rows, columns] = sources.size;
     let pairs = sources.pixels.windows(2).enumerate();
     let seams = pairs.filter(|(at, pair)| {
@@ -412,17 +427,11 @@ fn detail(sources: &Raster<'_>, brightness: &[u8]) -> Option<MosaicDetail> {
         start.min(sources.size[axis] - size[axis])
     };
     let [row, column] = [start(middle / columns, 0), start(middle % columns, 1)];
-    let cells = |of: &[u8]| -> Vec<u8> {
-        let lines = (row..row + size[0]).map(|row| row * columns + column);
-        lines
-            .flat_map(|at| &of[at..at + size[1]])
-            .copied()
-            .collect()
-    };
+    let [rows, columns] = [row..row + size[0], column..column + size[1]];
     Some(MosaicDetail {
         size,
-        brightness: cells(brightness),
-        sources: cells(sources.pixels),
+        brightness: cells.brightness.window(&rows, &columns),
+        sources: cells.sources.window(&rows, &columns),
     })
 }
 

@@ -57,11 +57,12 @@ fn every_cell_is_that_of_the_orthoimage_that_the_sources_identify() {
     let mosaic = made(&strips, &[], false);
     let [rows, columns] = mosaic.account.map.size;
     assert_eq!([rows, columns], [200, 180]);
-    let rasters =
-        [0, 1].map(|of: usize| Raster::of(&strips[of].account.map, &strips[of].brightness));
+    let cells = strips.each_ref().map(|of| of.brightness.bytes());
+    let rasters = [0, 1].map(|of: usize| Raster::of(&strips[of].account.map, &cells[of]));
     let first = first_cell(&mosaic.account.map);
     let mut cells = [0_u32; 3];
-    for (at, (brightness, source)) in mosaic.brightness.iter().zip(&mosaic.sources).enumerate() {
+    let [brightnesses, sources] = [&mosaic.brightness, &mosaic.sources].map(Tiles::bytes);
+    for (at, (brightness, source)) in brightnesses.iter().zip(&sources).enumerate() {
         let cell = [
             first[0] + (at / columns) as i64,
             first[1] + (at % columns) as i64,
@@ -81,7 +82,7 @@ fn every_cell_is_that_of_the_orthoimage_that_the_sources_identify() {
     assert!(counted.eq(cells[1..].iter().copied()));
     // Each strip keeps its own side, and the seam is between three quarters inside either.
     for row in 0..rows {
-        let sources = &mosaic.sources[row * columns..][..columns];
+        let sources = &sources[row * columns..][..columns];
         assert!(sources[..APART as usize].iter().all(|of| *of == 1));
         assert!(sources[COLUMNS..].iter().all(|of| *of == 2));
     }
@@ -94,7 +95,8 @@ fn balanced_tones_leave_no_step_at_the_seam() {
     let step = |mosaic: &Mosaic| {
         let columns = mosaic.account.map.size[1];
         let (mut sum, mut count) = (0.0, 0.0_f64);
-        for (at, pair) in mosaic.sources.windows(2).enumerate() {
+        let [brightness, sources] = [&mosaic.brightness, &mosaic.sources].map(Tiles::bytes);
+        for (at, pair) in sources.windows(2).enumerate() {
             if pair == [1, 2] && at % columns + 1 < columns {
                 let first = first_cell(&mosaic.account.map);
                 let cell = |at: usize| {
@@ -103,7 +105,7 @@ fn balanced_tones_leave_no_step_at_the_seam() {
                         first[1] + (at % columns) as i64,
                     ]
                 };
-                let [one, other] = [at, at + 1].map(|at| f64::from(mosaic.brightness[at]));
+                let [one, other] = [at, at + 1].map(|at| f64::from(brightness[at]));
                 sum += (other - one - (ground(cell(at + 1)) - ground(cell(at)))).abs();
                 count += 1.0;
             }
@@ -128,7 +130,7 @@ fn places_count_where_the_seam_crosses_their_squares() {
     let mosaic = made(&strips, &[], false);
     let columns = mosaic.account.map.size[1];
     let row = 100;
-    let sources = &mosaic.sources[row * columns..][..columns];
+    let sources = mosaic.sources.window(&(row..row + 1), &(0..columns));
     let seam = sources.iter().position(|of| *of == 2).unwrap();
     let first = first_cell(&mosaic.account.map);
     let place = |column: usize, east_m: f64| PlaceOffset {

@@ -9,11 +9,13 @@ use crate::{
     image_view::View,
     map_surface::SurfaceModel,
 };
-use areograph_base::{error::Result, watch::Watch};
+use areograph_base::{
+    column::{self, TILE, Tiles},
+    error::Result,
+    watch::Watch,
+};
 use areograph_geom::{ellipsoid::spherical_to_xyz_m, height_grid::HeightGrid};
 
-/// Cells along the edge of a tile.
-const TILE: usize = 256;
 /// Pixels around a place that its brightness needs, and some room.
 const ROOM_PX: f64 = 3.0;
 /// Distance of a place from the edge of the image within which its brightness is not known, pixels.
@@ -28,10 +30,19 @@ pub(super) struct Cells {
 
 /// Brightness of all cells.
 pub(super) struct Brightness {
-    /// Row by row; 0 where there is none.
-    pub(super) pixels: Vec<u8>,
+    /// 0 where there is none.
+    pub(super) cells: Tiles,
+    /// Number of cells with a brightness.
+    pub(super) filled: u32,
     /// Number of cells on ground inside the image whose pixels are missing.
     pub(super) without_pixels: u32,
+}
+
+/// Brightness of the cells of a tile.
+struct OfTile {
+    /// Row by row; 0 where there is none.
+    pixels: Vec<u8>,
+    without_pixels: u32,
 }
 
 impl Cells {
@@ -86,11 +97,6 @@ impl Cells {
         }))
     }
 
-    /// Rows and columns.
-    pub(super) const fn size(&self) -> [usize; 2] {
-        self.ground.size
-    }
-
     /// The cells as a grid without heights.
     pub(super) fn map(&self) -> HeightGrid {
         self.ground.height_grid(Vec::new())
@@ -106,35 +112,28 @@ impl Cells {
         sight_lines: &SightLines,
         watch: Watch<'_>,
     ) -> Result<Brightness> {
-        let [rows, columns] = self.ground.size;
+        let size = self.ground.size;
         let map = self.map();
-        let tiles = Tile::all([rows, columns], TILE, 1, 0);
+        let tiles = Tile::all(size, TILE, 1, 0);
         watch.announce(tiles.len());
-        let across = columns.div_ceil(TILE);
-        let mut pixels = vec![0; rows * columns];
-        // Rows of tiles, each with its part of the cells.
-        let of_rows = tiles
-            .par_chunks(across)
-            .zip(pixels.par_chunks_mut(TILE * columns));
-        let without_pixels = of_rows.map(|(tiles, pixels)| {
-            let mut without_pixels = 0;
-            for tile in tiles {
-                watch.check()?;
-                let found = self.of_tile(view, &sight_lines.shown, &map, tile)?;
-                let across = &tile.cells[1];
-                let rows = pixels.chunks_exact_mut(columns);
-                for (row, pixels) in rows.zip(found.pixels.chunks_exact(across.len())) {
-                    row[across.clone()].copy_from_slice(pixels);
-                }
-                without_pixels += found.without_pixels;
-                watch.step(1, "tiles");
-            }
-            Ok(without_pixels)
+        let made = tiles.par_iter().map(|tile| {
+            watch.check()?;
+            let found = self.of_tile(view, &sight_lines.shown, &map, tile)?;
+            watch.step(1, "tiles");
+            let filled = found.pixels.iter().filter(|pixel| **pixel > 0).count();
+            let counts = [filled, found.without_pixels as usize];
+            Ok((column::Tile::of(found.pixels), counts))
         });
-        let without_pixels: Vec<u32> = without_pixels.collect::<Result<_>>()?;
+        let (tiles, counts): (Vec<column::Tile>, Vec<[usize; 2]>) =
+            made.collect::<Result<Vec<_>>>()?.into_iter().unzip();
+        let sum = |of: usize| {
+            let sum: usize = counts.iter().map(|counts| counts[of]).sum();
+            u32::try_from(sum).unwrap_or(u32::MAX)
+        };
         Ok(Brightness {
-            pixels,
-            without_pixels: without_pixels.iter().sum(),
+            cells: Tiles::of_tiles(size, tiles),
+            filled: sum(0),
+            without_pixels: sum(1),
         })
     }
 
@@ -148,8 +147,8 @@ impl Cells {
         shown: &HeightGrid,
         map: &HeightGrid,
         tile: &Tile,
-    ) -> Result<Brightness> {
-        let mut found = Brightness {
+    ) -> Result<OfTile> {
+        let mut found = OfTile {
             pixels: vec![0; tile.size[0] * tile.size[1]],
             without_pixels: 0,
         };
@@ -173,7 +172,7 @@ impl Cells {
         let width = tile.size[1];
         let mut places = [vec![0.0; width], vec![0.0; width]];
         let mut numbers = vec![0.0; width];
-        let Brightness {
+        let OfTile {
             pixels,
             without_pixels,
         } = &mut found;

@@ -2,7 +2,7 @@
 //!
 //! Cubic convolution interpolates the brightness of a cell at the image point of its ground. A cell stays empty if its ground has
 //! no height or is hidden by relief, or if its lines were not received. Heights are interpolated across narrow holes of the terrain
-//! model, with larger standard deviations.
+//! model, with larger standard deviations. Brightness lies in tiles in a temporary file: memory contains the tiles at work.
 //!
 //! # Source
 //! The products that Shan, Lee & Yoon 2002 and Yoon & Shan 2004 announce; cubic convolution: Keys 1981.
@@ -27,6 +27,7 @@ use super::{
     tag_times::ImageTimes,
 };
 use areograph_base::{
+    column::Tiles,
     error::{Cause, Result},
     watch::Watch,
 };
@@ -68,8 +69,8 @@ stage_inputs! {
 pub struct Orthoimage {
     /// Statistics.
     pub account: OrthoimageAccount,
-    /// Brightness, row by row: pixel values from 1 on (a pixel of 0 becomes 1), 0 where there is none.
-    pub brightness: Vec<u8>,
+    /// Brightness: pixel values from 1 on (a pixel of 0 becomes 1), 0 where there is none.
+    pub brightness: Tiles,
     /// Standard deviations of the horizontal position of the ground in the cells of the terrain model, metres, NaN where the
     /// image does not show them: by heights, jitter and drift of the orientation, without the shared error.
     pub sigmas_m: Vec<f32>,
@@ -98,7 +99,7 @@ impl Orthoimage {
     pub fn without_cells(&self) -> Self {
         Self {
             account: self.account.clone(),
-            brightness: Vec::new(),
+            brightness: Tiles::default(),
             sigmas_m: Vec::new(),
         }
     }
@@ -167,7 +168,7 @@ enum RectifyError {
 
 impl Stage for RectifyImages<'_> {
     const NAME: &'static str = "rectify_images";
-    const METHOD: u32 = 2;
+    const METHOD: u32 = 3;
     type Output = Vec<Orthoimage>;
     stage_inputs!(fingerprint);
 
@@ -282,8 +283,7 @@ fn rectified(
         return Ok(None);
     };
     let brightness = cells.brightness(view, &sight_lines, watch)?;
-    let filled = brightness.pixels.iter().filter(|pixel| **pixel > 0).count();
-    if filled == 0 {
+    if brightness.filled == 0 {
         return Ok(None);
     }
     let count = |of: usize| u32::try_from(of).unwrap_or(u32::MAX);
@@ -295,7 +295,7 @@ fn rectified(
         parallel_rad: model.parallel_rad,
         cell_m,
         pixel_m: sight_lines.pixel_m,
-        filled: count(filled),
+        filled: brightness.filled,
         without_pixels: brightness.without_pixels,
         terrain_cells: count(sight_lines.seen()),
         hidden: count(sight_lines.hidden()),
@@ -304,11 +304,11 @@ fn rectified(
         jitter_m,
         drift_m,
         shared_sigma_m: None,
-        look: OrthoimageLook::of(cells.size(), &brightness.pixels),
+        look: OrthoimageLook::of(&brightness.cells),
     };
     Ok(Some(Orthoimage {
         account,
-        brightness: brightness.pixels,
+        brightness: brightness.cells,
         sigmas_m,
     }))
 }

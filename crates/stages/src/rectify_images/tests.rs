@@ -105,9 +105,9 @@ fn square(of: &Orthoimage, first: [i64; 2], edge: usize) -> Option<Patch> {
     if row + edge > rows || column + edge > columns {
         return None;
     }
-    let starts = (row..row + edge).map(|row| row * columns + column);
-    let pixels = starts.flat_map(|start| &of.brightness[start..start + edge]);
-    let values: Vec<f32> = pixels.map(|pixel| f32::from(*pixel)).collect();
+    let (rows, columns) = (row..row + edge, column..column + edge);
+    let pixels = of.brightness.window(&rows, &columns);
+    let values: Vec<f32> = pixels.into_iter().map(f32::from).collect();
     let size = [edge; 2];
     values.iter().all(|of| *of > 0.0).then_some(Patch {
         first,
@@ -161,7 +161,7 @@ fn orthoimages_show_the_ground_where_it_is() {
     let waves = Invented::waves(5);
     let columns = of.account.map.size[1];
     let mut differences = Vec::new();
-    for (at, pixel) in of.brightness.iter().enumerate() {
+    for (at, pixel) in of.brightness.bytes().iter().enumerate() {
         // White is clipped.
         if [0, 1, 255].contains(pixel) {
             continue;
@@ -209,7 +209,8 @@ fn ground_that_relief_hides_stays_empty() {
     let model = model(terrace_m);
     let of = orthoimage(1, [0.0; 2], terrace_m, &model);
     let columns = of.account.map.size[1];
-    let shown = of.brightness.iter().enumerate();
+    let brightness = of.brightness.bytes();
+    let shown = brightness.iter().enumerate();
     let shown = shown.filter(|(_, pixel)| **pixel > 0);
     let east_m = shown.map(|(at, _)| {
         let [longitude_rad, _] = of.account.map.place_rad([0.0, (at % columns) as f64]);
@@ -254,7 +255,7 @@ fn large_cells_are_means_of_small_ones_and_cells_larger_than_the_image_are_empty
     // Differences from the means of small cells, `aside` of these too far east.
     let rms = |aside: i64| {
         let mut squares = Vec::new();
-        for (at, pixel) in coarse.brightness.iter().enumerate() {
+        for (at, pixel) in coarse.brightness.bytes().iter().enumerate() {
             let [longitude_rad, latitude_rad] =
                 (coarse.account.map).place_rad([(at / columns) as f64, (at % columns) as f64]);
             let middle = fine.account.map.cell_of(longitude_rad, latitude_rad);

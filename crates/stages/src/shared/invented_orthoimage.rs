@@ -11,6 +11,7 @@ use crate::{
     look::OrthoimageLook,
     rectify_images::{Orthoimage, OrthoimageAccount},
 };
+use areograph_base::column::Tiles;
 use areograph_geom::height_grid::HeightGrid;
 
 pub(crate) const RADIUS_M: f64 = 3_396_190.0;
@@ -36,11 +37,11 @@ pub(crate) fn orthoimage(
         (0..size[0] as i64).flat_map(|row| (0..size[1] as i64).map(move |column| [row, column]));
     let brightness =
         cells.map(|cell| brightness([0, 1].map(|axis| first[axis] + cell[axis])) as u8);
-    let brightness: Vec<u8> = brightness.collect();
+    let brightness = Tiles::of(size, &brightness.collect::<Vec<u8>>());
     Orthoimage {
         account: OrthoimageAccount {
             image,
-            look: OrthoimageLook::of(size, &brightness),
+            look: OrthoimageLook::of(&brightness),
             map,
             parallel_rad: 0.0,
             cell_m: CELL_M,

@@ -1,5 +1,6 @@
 //! Brightness of an orthoimage or a mosaic in larger cells, for display.
 
+use areograph_base::column::{Tiles, spans};
 use serde::{Deserialize, Serialize};
 
 /// Cells along the longer side of an orthoimage on a page.
@@ -16,16 +17,22 @@ pub struct OrthoimageLook {
 
 impl OrthoimageLook {
     /// In cells so large that no side has more than [`LOOK`] of them.
-    pub(crate) fn of([rows, columns]: [usize; 2], pixels: &[u8]) -> Self {
+    pub(crate) fn of(cells: &Tiles) -> Self {
+        let [rows, columns] = cells.size();
         let step = rows.max(columns).div_ceil(LOOK).max(1);
         let size = [rows.div_ceil(step), columns.div_ceil(step)];
         let mut sums = vec![[0_u32; 2]; size[0] * size[1]];
-        for (row, pixels) in pixels.chunks_exact(columns.max(1)).enumerate() {
-            for (column, pixel) in pixels.iter().enumerate() {
-                if *pixel > 0 {
-                    let [sum, count] = &mut sums[row / step * size[1] + column / step];
-                    *sum += u32::from(*pixel);
-                    *count += 1;
+        for [rows, columns] in spans([rows, columns]) {
+            let Some(pixels) = cells.filled_window(&rows, &columns) else {
+                continue;
+            };
+            for (row, pixels) in rows.zip(pixels.chunks_exact(columns.len())) {
+                for (column, pixel) in columns.clone().zip(pixels) {
+                    if *pixel > 0 {
+                        let [sum, count] = &mut sums[row / step * size[1] + column / step];
+                        *sum += u32::from(*pixel);
+                        *count += 1;
+                    }
                 }
             }
         }

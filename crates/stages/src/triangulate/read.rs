@@ -151,6 +151,7 @@ fn read_pictures_of(config: &NetConfig, index: &Index, data: &mut NetData) -> Re
                 picture,
                 brick,
                 metres_per_unit,
+                ..
             } = row;
             if let Some(&at) = index.pictures.get(&picture) {
                 data.bricks[at] = brick;

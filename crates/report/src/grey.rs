@@ -10,7 +10,8 @@
 const CLIPPED: f64 = 0.005;
 
 /// The brightness that is shown as black, and as white.
-pub(super) fn stretched(brightness: &[u8]) -> [u8; 2] {
+#[must_use]
+pub fn stretched(brightness: &[u8]) -> [u8; 2] {
     let mut known: Vec<u8> = brightness.iter().copied().filter(|of| *of > 0).collect();
     known.sort_unstable();
     let at = |share: f64| {
@@ -21,7 +22,8 @@ pub(super) fn stretched(brightness: &[u8]) -> [u8; 2] {
 }
 
 /// Pixels of four bytes, the last of them the opacity.
-pub(super) fn grey(brightness: &[u8], ends: [u8; 2]) -> Vec<u8> {
+#[must_use]
+pub fn grey(brightness: &[u8], ends: [u8; 2]) -> Vec<u8> {
     let [dark, bright] = ends.map(f64::from);
     let pixel = |brightness: &u8| {
         let share = (f64::from(*brightness) - dark) / (bright - dark).max(1.0);

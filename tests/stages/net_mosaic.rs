@@ -1,0 +1,341 @@
+//! The mosaic of a synthetic net, whose ground has a known brightness at every place of the map.
+
+use std::{fs, path::Path};
+
+use areograph::{
+    config::{Document as _, NetConfig},
+    error::Error,
+    flow::{RunOutcome, Task},
+    scene::write_plane_scene,
+};
+use serde_json::Value;
+use tiff::{
+    decoder::{Decoder, DecodingResult},
+    tags::Tag,
+};
+
+use crate::common::{assert_keeps_schema, flows::run_into, json, number, readers::program};
+
+const SEED: u64 = 3;
+/// Cells between compared places of a picture, cells to either side, and cells of a compared square.
+const APART: usize = 40;
+const REACH: i64 = 10;
+const HALF: i64 = 6;
+
+fn scene() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    write_plane_scene(&folder.path().join("net"), SEED).unwrap();
+    folder
+}
+
+fn run(folder: &Path) -> Result<RunOutcome, Error> {
+    let net = NetConfig::load(&folder.join("net/net.toml"))?.config;
+    run_into(Task::Net(&net), &folder.join("out"), false)
+}
+
+/// The table of pictures with every row replaced by what `change` returns for its fields.
+fn change_pictures(folder: &Path, change: impl Fn(&mut Vec<String>)) {
+    let path = folder.join("net/pictures.csv");
+    let text = fs::read_to_string(&path).unwrap();
+    let rows = text.lines().enumerate().map(|(index, row)| {
+        let mut fields: Vec<String> = row.split(',').map(str::to_owned).collect();
+        if index > 0 {
+            change(&mut fields);
+        }
+        fields.join(",") + "\n"
+    });
+    fs::write(path, rows.collect::<String>()).unwrap();
+}
+
+/// A raster on the map.
+struct OnMap {
+    cells: Vec<u8>,
+    size: [usize; 2],
+    cell_m: f64,
+    /// Western and northern edge.
+    edges_m: [f64; 2],
+}
+
+impl OnMap {
+    fn of(path: &Path) -> Self {
+        let mut decoder = Decoder::new(fs::File::open(path).unwrap()).unwrap();
+        let (columns, rows) = decoder.dimensions().unwrap();
+        let scale = decoder.get_tag_f64_vec(Tag::ModelPixelScaleTag).unwrap();
+        let corner = decoder.get_tag_f64_vec(Tag::ModelTiepointTag).unwrap();
+        let DecodingResult::U8(cells) = decoder.read_image().unwrap() else {
+            panic!("other numbers");
+        };
+        Self {
+            cells,
+            size: [rows as usize, columns as usize],
+            cell_m: scale[0],
+            edges_m: [corner[3], corner[4]],
+        }
+    }
+
+    fn at(&self, [row, column]: [i64; 2]) -> u8 {
+        let [row, column] = [row, column].map(|at| usize::try_from(at).unwrap());
+        self.cells[row * self.size[1] + column]
+    }
+}
+
+/// The true brightness of the ground.
+struct Ground {
+    mean_dn: f64,
+    /// Amplitude, numbers of radians per metre towards east and north, phase.
+    waves: Vec<[f64; 4]>,
+}
+
+impl Ground {
+    fn of(truth: &Value) -> Self {
+        let names = [
+            "amplitude_dn",
+            "east_rad_per_m",
+            "north_rad_per_m",
+            "phase_rad",
+        ];
+        let waves = truth["ground"]["waves"].as_array().unwrap().iter();
+        Self {
+            mean_dn: number(&truth["ground"]["mean_dn"]),
+            waves: waves
+                .map(|wave| names.map(|name| number(&wave[name])))
+                .collect(),
+        }
+    }
+
+    fn brightness_dn(&self, [east_m, north_m]: [f64; 2]) -> f64 {
+        let waves = self
+            .waves
+            .iter()
+            .map(|[amplitude_dn, east, north, phase_rad]| {
+                amplitude_dn * (east * east_m + north * north_m + phase_rad).cos()
+            });
+        self.mean_dn + waves.sum::<f64>()
+    }
+}
+
+fn correlation(pairs: &[[f64; 2]]) -> f64 {
+    let count = pairs.len() as f64;
+    let mean = [0, 1].map(|of: usize| pairs.iter().map(|pair| pair[of]).sum::<f64>() / count);
+    let product = |a: usize, b: usize| {
+        let terms = pairs
+            .iter()
+            .map(|pair| (pair[a] - mean[a]) * (pair[b] - mean[b]));
+        terms.sum::<f64>()
+    };
+    product(0, 1) / (product(0, 0) * product(1, 1)).sqrt()
+}
+
+/// For every picture, its mean error towards east and north at the places that it alone shows, metres, and the number of places: the shift at which a square
+/// correlates best with the true ground.
+fn errors_m(
+    mosaic: &OnMap,
+    sources: &OnMap,
+    ground: &Ground,
+    count: usize,
+) -> Vec<([f64; 2], usize)> {
+    let span = HALF + REACH;
+    let mut sums = vec![([0.0; 2], 0); count];
+    for row in (0..mosaic.size[0]).step_by(APART) {
+        for column in (0..mosaic.size[1]).step_by(APART) {
+            let middle = [row, column].map(|at| i64::try_from(at).unwrap());
+            let is_inside = (0..2).all(|axis| {
+                middle[axis] >= HALF
+                    && middle[axis] + HALF < i64::try_from(mosaic.size[axis]).unwrap()
+            });
+            let square = || {
+                let rows = middle[0] - HALF..=middle[0] + HALF;
+                rows.flat_map(move |row| {
+                    (middle[1] - HALF..=middle[1] + HALF).map(move |column| [row, column])
+                })
+            };
+            let source = sources.at(middle);
+            if !is_inside || source == 0 || square().any(|cell| sources.at(cell) != source) {
+                continue;
+            }
+            // The true ground around, cell by cell.
+            let edge = 2 * span + 1;
+            let mut around = Vec::new();
+            for down in -span..=span {
+                for right in -span..=span {
+                    let east_m =
+                        mosaic.edges_m[0] + ((middle[1] + right) as f64 + 0.5) * mosaic.cell_m;
+                    let north_m =
+                        mosaic.edges_m[1] - ((middle[0] + down) as f64 + 0.5) * mosaic.cell_m;
+                    around.push(ground.brightness_dn([east_m, north_m]));
+                }
+            }
+            let at_shift = |shift: [i64; 2]| {
+                let pairs = square().map(|cell| {
+                    let [down, right] =
+                        [0, 1].map(|axis| cell[axis] - middle[axis] + shift[axis] + span);
+                    let there = around[usize::try_from(down * edge + right).unwrap()];
+                    [f64::from(mosaic.at(cell)), there]
+                });
+                correlation(&pairs.collect::<Vec<_>>())
+            };
+            let shifts =
+                (-REACH..=REACH).flat_map(|down| (-REACH..=REACH).map(move |right| [down, right]));
+            let best = shifts
+                .max_by(|one, other| at_shift(*one).total_cmp(&at_shift(*other)))
+                .unwrap();
+            assert!(
+                at_shift(best) > 0.85,
+                "{middle:?} of {source}: {best:?} {}",
+                at_shift(best)
+            );
+            let (sum_m, places) = &mut sums[usize::from(source) - 1];
+            // The ground of a cell lies `best` cells farther: the mosaic shows it too far the other way.
+            sum_m[0] -= best[1] as f64 * mosaic.cell_m;
+            sum_m[1] += best[0] as f64 * mosaic.cell_m;
+            *places += 1;
+        }
+    }
+    let mean =
+        |(sum_m, places): ([f64; 2], usize)| (sum_m.map(|of| of / places.max(1) as f64), places);
+    sums.into_iter().map(mean).collect()
+}
+
+#[test]
+fn pictures_lie_on_the_map_where_they_state() {
+    let folder = scene();
+    run(folder.path()).unwrap();
+    let out = folder.path().join("out/synthetic_net");
+    let [mosaic, sources] =
+        ["mosaic.tif", "mosaic_source.tif"].map(|name| OnMap::of(&out.join(name)));
+    let document = json(&out.join("mosaic.json"));
+    assert_keeps_schema(&document, "net_mosaic");
+    let pictures = document["pictures"].as_array().unwrap();
+    assert_eq!(pictures.len(), 9);
+    let truth = json(&folder.path().join("net/truth.json"));
+    let errors = errors_m(&mosaic, &sources, &Ground::of(&truth), pictures.len());
+    for ((error_m, places), picture) in errors.iter().zip(pictures) {
+        let sigma_m = number(&picture["sigma_m"]);
+        println!(
+            "{}: {error_m:.0?} m at {places} places, stated {sigma_m:.0} m",
+            picture["picture"]
+        );
+        assert!(*places >= 6);
+        for error_m in error_m {
+            // Shifts are whole cells.
+            assert!(error_m.abs() <= 3.0 * sigma_m + 0.5 * mosaic.cell_m);
+        }
+    }
+    // The pictures share the error of the controls; between pictures there is only that of the measurements.
+    let pairs = document["pairs"].as_array().unwrap();
+    assert!(pairs.len() >= 12);
+    for pair in pairs.iter().filter(|pair| number(&pair["places"]) > 0.0) {
+        let [east_m, north_m] = [0, 1].map(|axis| number(&pair["median_m"][axis]));
+        assert!(east_m.hypot(north_m) < 0.5 * mosaic.cell_m, "{pair}");
+    }
+    assert!(!document["seams"].as_array().unwrap().is_empty());
+    let page = fs::read_to_string(out.join("report/index.html")).unwrap();
+    assert!(
+        page.contains("Mosaic of the pictures, north up") && page.contains("mosaic_source.tif")
+    );
+    as_gdal_reads_it(&out.join("mosaic.tif"), &mosaic);
+}
+
+/// The map and its extent, by GDAL where it is installed.
+fn as_gdal_reads_it(path: &Path, mosaic: &OnMap) {
+    let Some(mut gdalinfo) = program("gdalinfo", "the mosaic of a net in GDAL") else {
+        return;
+    };
+    let text = gdalinfo.arg("-json").arg(path).output().unwrap().stdout;
+    let text = String::from_utf8(text).unwrap();
+    let found: Value = serde_json::from_str(&text).unwrap();
+    let wkt = found["coordinateSystem"]["wkt"].as_str().unwrap();
+    assert!(wkt.contains("Mercator") && wkt.contains("3396190"), "{wkt}");
+    let transform = found["geoTransform"].as_array().unwrap();
+    let expected = [
+        mosaic.edges_m[0],
+        mosaic.cell_m,
+        0.0,
+        mosaic.edges_m[1],
+        0.0,
+        -mosaic.cell_m,
+    ];
+    for (found, expected) in transform.iter().zip(expected) {
+        assert!((number(found) - expected).abs() < 1e-6, "{transform:?}");
+    }
+}
+
+#[test]
+fn the_direction_of_y_does_not_change_the_mosaic() {
+    let [up, down] = [scene(), scene()];
+    let measurements = down.path().join("net/measurements.csv");
+    let text = fs::read_to_string(&measurements).unwrap();
+    let negative = |y: &str| {
+        y.strip_prefix('-')
+            .map_or_else(|| format!("-{y}"), str::to_owned)
+    };
+    let rows = text.lines().enumerate().map(|(index, row)| {
+        let (rest, y) = row.rsplit_once(',').unwrap();
+        if index == 0 {
+            format!("{row}\n")
+        } else {
+            format!("{rest},{}\n", negative(y))
+        }
+    });
+    fs::write(&measurements, rows.collect::<String>()).unwrap();
+    change_pictures(down.path(), |fields| {
+        if !fields[5].is_empty() {
+            fields[5] = negative(&fields[5]);
+        }
+    });
+    let toml = down.path().join("net/net.toml");
+    let text = fs::read_to_string(&toml).unwrap();
+    fs::write(
+        &toml,
+        text.replace(
+            "[\"measurements.csv\"]",
+            "[\"measurements.csv\"]\ny_axis = \"down\"",
+        ),
+    )
+    .unwrap();
+    let bytes = [up, down].map(|folder| {
+        run(folder.path()).unwrap();
+        fs::read(folder.path().join("out/synthetic_net/mosaic.tif")).unwrap()
+    });
+    assert!(bytes[0] == bytes[1]);
+}
+
+#[test]
+fn images_that_do_not_fit_are_refused() {
+    let refused = |change: &dyn Fn(&mut Vec<String>)| {
+        let folder = scene();
+        change_pictures(folder.path(), change);
+        run(folder.path()).unwrap_err().to_string()
+    };
+    let message = refused(&|fields| {
+        if fields[0] == "P02" {
+            fields[3] = "images/other.tif".to_owned();
+        }
+    });
+    assert!(
+        message.contains("picture P02") && message.contains("other.tif, which does not exist"),
+        "{message}"
+    );
+    // A corner far away, and pixels of half the size.
+    let changes: [(usize, fn(f64) -> f64); 2] = [(5, |y| y + 1e4), (6, |units| 0.5 * units)];
+    for (field, changed) in changes {
+        let message = refused(&|fields| {
+            if fields[0] == "P03" {
+                fields[field] = changed(fields[field].parse().unwrap()).to_string();
+            }
+        });
+        assert!(
+            message.contains("picture P03: point ") && message.contains("lines of "),
+            "{message}"
+        );
+    }
+    let folder = scene();
+    let path = folder.path().join("net/pictures.csv");
+    let text = fs::read_to_string(&path).unwrap() + "P99,,,images/P01.tif,0,0,1\n";
+    fs::write(&path, text).unwrap();
+    let message = run(folder.path()).unwrap_err().to_string();
+    assert!(
+        message.contains("picture P99 has an image and no place in the net"),
+        "{message}"
+    );
+}
