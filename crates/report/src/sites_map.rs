@@ -97,10 +97,7 @@ pub(super) fn figure_of_many(body: Body, places: &[Place]) -> Result<Markup> {
     }
     let marks: Vec<Place> = cells.into_values().copied().collect();
     let features: Vec<&Feature> = FEATURES.iter().filter(|of| of.body == body).collect();
-    let mut labels = Labels::new(WIDTH as i32 - 4, TOP + MAP_HEIGHT);
-    for place in &marks {
-        labels.keep_off(pixel(place.place_deg), MARK_SIZE);
-    }
+    let mut labels = labels_beside(&marks);
     labels.set_letters(SMALL);
     for feature in &features {
         name_feature(feature, &mut labels);
@@ -170,16 +167,22 @@ fn pixel((longitude, latitude): (f64, f64)) -> (i32, i32) {
     (LEFT + x.round() as i32, TOP + y.round() as i32)
 }
 
-/// Names of the sites, then of as many features as fit between them; and the sites without a name.
-fn names<'a>(places: &[Place<'a>], features: &[&Feature]) -> (Labels, Vec<&'a str>) {
-    let mut names = Labels::new(WIDTH as i32 - 4, TOP + MAP_HEIGHT);
+/// Labels that keep off the marks of sites.
+fn labels_beside(places: &[Place]) -> Labels {
+    let mut labels = Labels::new(WIDTH as i32 - 4, TOP + MAP_HEIGHT);
     // The left side is reserved for the names of parallels.
     for y in (TOP..TOP + MAP_HEIGHT).step_by(LETTERS as usize) {
-        names.keep_off((LEFT / 2, y), LEFT / 2 - 4);
+        labels.keep_off((LEFT / 2, y), LEFT / 2 - 4);
     }
     for place in places {
-        names.keep_off(pixel(place.place_deg), MARK_SIZE);
+        labels.keep_off(pixel(place.place_deg), MARK_SIZE);
     }
+    labels
+}
+
+/// Names of the sites, then of as many features as fit between them; and the sites without a name.
+fn names<'a>(places: &[Place<'a>], features: &[&Feature]) -> (Labels, Vec<&'a str>) {
+    let mut names = labels_beside(places);
     let mut unnamed = Vec::new();
     for place in places {
         if !names.place_around(place.name, INK, pixel(place.place_deg)) {

@@ -186,7 +186,7 @@ fn plot_by(
     };
     let list = largest.iter().enumerate().map(|(place, (group, count))| {
         let group = if group.is_empty() { "none" } else { group };
-        format!("{} {group} ({})", place + 1, whole(*count))
+        format!("{}: {group} ({})", place + 1, whole(*count))
     });
     let list: Vec<String> = list.collect();
     let mut words = format!(
@@ -200,8 +200,8 @@ fn plot_by(
     let places = largest.len() + usize::from(others > 0);
     Some(Plot {
         x: Extent {
-            low: 0.5,
-            high: places as f64 + 0.5,
+            low: 0.6,
+            high: places as f64 + 0.4,
         },
         ..Plot::of(
             format!("Misregistration by {name}"),
