@@ -25,6 +25,9 @@ const NAMED_MAX: usize = 12;
 /// Days of a year.
 const YEAR_DAYS: f64 = 365.25;
 
+/// An axis: its name in titles, its label, and the value of a pair.
+type Axis<T> = (&'static str, &'static str, fn(&PairRow) -> T);
+
 /// Along-track misregistration, image with the larger emission minus the other, metres.
 fn along_m(pair: &PairRow, state: Option<&PairState>) -> Option<f64> {
     Some(pair.sense() * state?.misregistration?.along_m.value)
@@ -41,7 +44,7 @@ pub(super) fn misregistration(rows: &CampaignRows) -> Result<Markup> {
     if pairs.is_empty() {
         return Ok(paragraph("No valid pair has footprints in both images."));
     }
-    let over: [(&str, &'static str, fn(&PairRow) -> Option<f64>); 3] = [
+    let over: [Axis<Option<f64>>; 3] = [
         ("emission", "larger emission of the pair, degrees", |pair| {
             let [first, second] = pair.emission_rad;
             Some(first?.max(second?).to_degrees())
@@ -53,7 +56,7 @@ pub(super) fn misregistration(rows: &CampaignRows) -> Result<Markup> {
             year(&pair.utc_start[0])
         }),
     ];
-    let groups: [(&str, &'static str, fn(&PairRow) -> String); 3] = [
+    let groups: [Axis<String>; 3] = [
         ("mission phase", "number of the phase", |pair| {
             phase_or_unknown(&pair.phases[0]).to_owned()
         }),
