@@ -15,11 +15,7 @@ use areograph::{
     flow::{CampaignAnswer, CampaignSite, publish_results},
     pds::image_index::IndexedImage,
 };
-use arrow_array::{
-    RecordBatch,
-    cast::AsArray,
-    types::{Float64Type, UInt32Type},
-};
+use arrow_array::{RecordBatch, cast::AsArray, types::Float64Type};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use serde_json::Value;
 
@@ -276,11 +272,43 @@ fn pooled_numbers_follow_from_the_documents_of_the_sites() {
     assert!(inside > 100.0 && inside < shots, "{inside} of {shots}");
 }
 
+/// Rows of each phase of a table.
+fn rows_of_phases(folder: &Path, name: &str) -> Vec<(String, usize)> {
+    let parts = rows(folder, name).into_iter();
+    parts
+        .map(|(phase, rows)| (phase, rows.num_rows()))
+        .collect()
+}
+
 #[test]
-fn tables_are_divided_by_phase_and_sites_without_products_are_rows_with_the_reason() {
+fn tables_are_divided_by_the_phases_of_the_index() {
+    let out = sites(&SITES);
+    let answer = publish(out.path(), &SITES);
+    let pairs = rows_of_phases(&answer.folder, "pairs");
+    assert_eq!(pairs[0], ("E02".to_owned(), 3));
+    // The index does not have the images of the last site.
+    assert_eq!((pairs.len(), &*pairs[1].0), (2, "unknown"));
+    let images = rows_of_phases(&answer.folder, "images");
+    let of_index = [("E02".to_owned(), 5), ("E04".to_owned(), 1)];
+    assert_eq!(images[..2], of_index);
+    assert_eq!(images[2].0, "unknown");
+    let (_, of_phase) = &rows(&answer.folder, "images")[1];
+    assert_eq!(numbers(of_phase, "orbit"), [Some(101.0)]);
+    assert_eq!(texts(of_phase, "image"), ["E04-01275"]);
+}
+
+/// Numbers of sites: valid ones, invalid ones, and those in each state without usable products.
+fn counts(answer: &CampaignAnswer) -> [u32; 5] {
+    let of = answer.summary.sites;
+    let valid = of.valid + of.valid_with_remarks;
+    [valid, of.invalid, of.failed, of.absent, of.unusable]
+}
+
+/// A damaged product, products of another version, a failed run, and a site that never ran.
+#[test]
+fn sites_without_usable_products_are_rows_with_the_reason() {
     let out = sites(&SITES);
     let names: Vec<&str> = SITES.iter().copied().chain(["never_run"]).collect();
-    // A page of an earlier run, another version, and a failed run.
     let spoil = |site: &str, file: &str, from: &str, to: &str| {
         let path = out.path().join(site).join(file);
         let text = fs::read_to_string(&path).unwrap();
@@ -288,64 +316,25 @@ fn tables_are_divided_by_phase_and_sites_without_products_are_rows_with_the_reas
         fs::write(&path, text.replacen(from, to, 1)).unwrap();
     };
     let sound = publish(out.path(), &names);
-    let counts = |answer: &CampaignAnswer| {
-        let of = answer.summary.sites;
-        [of.sites, of.invalid, of.failed, of.absent, of.unusable]
-    };
-    let valid = |answer: &CampaignAnswer| {
-        answer.summary.sites.valid + answer.summary.sites.valid_with_remarks
-    };
-    assert_eq!(counts(&sound), [5, 4 - valid(&sound), 0, 1, 0]);
-    let phases: Vec<String> = rows(&sound.folder, "pairs")
-        .into_iter()
-        .map(|of| of.0)
-        .collect();
-    assert_eq!(phases, ["E02", "unknown"]);
-    let of_sound = rows(&sound.folder, "pairs");
-    let sound_pairs = |phase: &str| {
-        let rows = of_sound.iter().filter(|of| of.0 == phase);
-        u32::try_from(rows.map(|of| of.1.num_rows()).sum::<usize>()).unwrap()
-    };
-    assert_eq!(sound_pairs("E02"), 3);
-    let images = rows(&sound.folder, "images");
-    let of_phase: Vec<(String, usize)> = images
-        .iter()
-        .map(|(phase, rows)| (phase.clone(), rows.num_rows()))
-        .collect();
-    assert_eq!(
-        of_phase[..2],
-        [("E02".to_owned(), 5), ("E04".to_owned(), 1)]
-    );
-    assert_eq!(of_phase[2].0, "unknown");
-    let orbit = &images[1].1;
-    assert_eq!(numbers(orbit, "orbit"), [Some(101.0)]);
-    assert_eq!(
-        orbit
-            .column_by_name("inside")
-            .unwrap()
-            .as_primitive::<UInt32Type>()
-            .len(),
-        1
-    );
-
+    let [valid, invalid, ..] = counts(&sound);
+    assert_eq!(counts(&sound), [valid, 4 - valid, 0, 1, 0]);
     spoil("eos_chasma", "ranges.json", "\"shots\"", "\"Shots\"");
+    let version = "\"version\": \"";
     spoil(
         "gusev_crater",
         "manifest.json",
-        "\"version\": \"",
-        "\"version\": \"9.",
+        version,
+        &format!("{version}9."),
     );
-    fs::write(
-        out.path().join("isidis/.failed"),
-        "a kernel is gone\n  what to do: look",
-    )
-    .unwrap();
+    let failed = out.path().join("isidis/.failed");
+    fs::write(failed, "a kernel is gone\n  what to do: look").unwrap();
     let answer = publish(out.path(), &names);
-    assert_eq!(valid(&answer), valid(&sound) - 3);
-    assert_eq!(counts(&answer), [5, counts(&sound)[1], 1, 1, 2]);
-    // Those of the remaining site, whose images the index does not have.
-    let unknown = sound_pairs("unknown");
-    assert_eq!(answer.summary.pair_rows, unknown);
+    assert_eq!(counts(&answer), [valid - 3, invalid, 1, 1, 2]);
+    // The pairs of the remaining site.
+    let [(_, rest)] = &rows_of_phases(&answer.folder, "pairs")[..] else {
+        panic!("pairs of several phases");
+    };
+    assert_eq!(answer.summary.pair_rows as usize, *rest);
     let mut reasons = Vec::new();
     for (_, rows) in rows(&answer.folder, "sites") {
         let columns = ["site", "state", "failure"].map(|name| texts(&rows, name));
@@ -353,28 +342,18 @@ fn tables_are_divided_by_phase_and_sites_without_products_are_rows_with_the_reas
             reasons.push(columns.each_ref().map(|column| column[row].clone()));
         }
     }
-    let reason = |site: &str| reasons.iter().find(|of| of[0] == site).unwrap();
-    assert_eq!(reason("isidis")[1..], ["failed", "a kernel is gone"]);
-    assert_eq!(
-        reason("never_run")[1..],
-        ["absent", "no run of the site has finished"]
-    );
-    let [_, state, failure] = reason("eos_chasma");
-    assert!(
-        state == "unusable" && failure.starts_with("eos_chasma/ranges.json: has "),
-        "{failure}"
-    );
-    let [_, state, failure] = reason("gusev_crater");
-    assert!(
-        state == "unusable" && failure.contains("areograph 9."),
-        "{failure}"
-    );
+    for (site, state, reason) in [
+        ("isidis", "failed", "a kernel is gone"),
+        ("never_run", "absent", "no run of the site has finished"),
+        ("eos_chasma", "unusable", "eos_chasma/ranges.json: has "),
+        ("gusev_crater", "unusable", "products of areograph 9."),
+    ] {
+        let found = reasons.iter().find(|of| of[0] == site).unwrap();
+        assert!(found[1] == state && found[2].contains(reason), "{found:?}");
+    }
     // The index still has their images.
-    let images: usize = rows(&answer.folder, "images")
-        .iter()
-        .map(|of| of.1.num_rows())
-        .sum();
-    assert!(images >= 6);
+    let images = rows_of_phases(&answer.folder, "images");
+    assert!(images.iter().map(|of| of.1).sum::<usize>() >= 6);
     let page = fs::read_to_string(&answer.page).unwrap();
     for words in [
         "1 failed",

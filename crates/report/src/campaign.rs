@@ -153,7 +153,7 @@ fn key_numbers(summary: &CampaignSummary) -> Markup {
     let spacings = arrow(
         before.and_then(|of| of.along_rms_spacings),
         after.and_then(|of| of.along_rms_spacings),
-        2,
+        3,
     );
     let mean = before.and_then(|of| of.along_mean_m);
     let [low, high] = [&summary.before, &summary.after].map(|of| of.heights.as_ref());

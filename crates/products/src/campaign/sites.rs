@@ -31,8 +31,14 @@ pub(super) static CSV: Declaration<WriteCampaign> = Declaration {
 };
 
 fn columns<'a>() -> Vec<Column<&'a SiteRow>> {
+    [outcome(), counts(), inputs()]
+        .into_iter()
+        .flatten()
+        .collect()
+}
+
+fn outcome<'a>() -> Vec<Column<&'a SiteRow>> {
     type Row<'a> = &'a SiteRow;
-    let degrees = |radians: f64| radians / RADIANS_PER_DEGREE;
     vec![
         phase_column(|row: &SiteRow| &row.phase),
         column("site", Unit::None, "identifier of the site", |row: &Row| {
@@ -74,6 +80,13 @@ fn columns<'a>() -> Vec<Column<&'a SiteRow>> {
             "why the site has no usable products; empty if it has",
             |row: &Row| row.failure.clone(),
         ),
+    ]
+}
+
+fn counts<'a>() -> Vec<Column<&'a SiteRow>> {
+    type Row<'a> = &'a SiteRow;
+    let degrees = |radians: f64| radians / RADIANS_PER_DEGREE;
+    vec![
         column("body", Unit::None, "the body", |row: &Row| {
             row.body.to_string()
         }),
@@ -101,6 +114,12 @@ fn columns<'a>() -> Vec<Column<&'a SiteRow>> {
         column("footprints", Unit::None, "footprints", |row: &Row| {
             row.footprints
         }),
+    ]
+}
+
+fn inputs<'a>() -> Vec<Column<&'a SiteRow>> {
+    type Row<'a> = &'a SiteRow;
+    vec![
         column(
             "folder",
             Unit::None,

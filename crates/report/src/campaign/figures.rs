@@ -25,6 +25,9 @@ const NAMED_MAX: usize = 12;
 /// Days of a year.
 const YEAR_DAYS: f64 = 365.25;
 
+/// An axis: its name in titles, its label, and the value of a pair.
+type Axis<T> = (&'static str, &'static str, fn(&PairRow) -> T);
+
 /// Along-track misregistration, image with the larger emission minus the other, metres.
 fn along_m(pair: &PairRow, state: Option<&PairState>) -> Option<f64> {
     Some(pair.sense() * state?.misregistration?.along_m.value)
@@ -41,7 +44,7 @@ pub(super) fn misregistration(rows: &CampaignRows) -> Result<Markup> {
     if pairs.is_empty() {
         return Ok(paragraph("No valid pair has footprints in both images."));
     }
-    let over: [(&str, &'static str, fn(&PairRow) -> Option<f64>); 3] = [
+    let over: [Axis<Option<f64>>; 3] = [
         ("emission", "larger emission of the pair, degrees", |pair| {
             let [first, second] = pair.emission_rad;
             Some(first?.max(second?).to_degrees())
@@ -53,7 +56,7 @@ pub(super) fn misregistration(rows: &CampaignRows) -> Result<Markup> {
             year(&pair.utc_start[0])
         }),
     ];
-    let groups: [(&str, &'static str, fn(&PairRow) -> String); 3] = [
+    let groups: [Axis<String>; 3] = [
         ("mission phase", "number of the phase", |pair| {
             phase_or_unknown(&pair.phases[0]).to_owned()
         }),
@@ -186,7 +189,7 @@ fn plot_by(
     };
     let list = largest.iter().enumerate().map(|(place, (group, count))| {
         let group = if group.is_empty() { "none" } else { group };
-        format!("{} {group} ({})", place + 1, whole(*count))
+        format!("{}: {group} ({})", place + 1, whole(*count))
     });
     let list: Vec<String> = list.collect();
     let mut words = format!(
@@ -200,8 +203,8 @@ fn plot_by(
     let places = largest.len() + usize::from(others > 0);
     Some(Plot {
         x: Extent {
-            low: 0.5,
-            high: places as f64 + 0.5,
+            low: 0.6,
+            high: places as f64 + 0.4,
         },
         ..Plot::of(
             format!("Misregistration by {name}"),

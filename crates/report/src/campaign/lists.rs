@@ -22,7 +22,7 @@ fn page_of(site: &str, anchor: &str) -> Cell {
 }
 
 /// The rows with the largest values, in order; equal ones as they come.
-fn largest<'a, R>(rows: &'a [R], of: impl Fn(&R) -> Option<f64>) -> Vec<&'a R> {
+fn largest<R>(rows: &[R], of: impl Fn(&R) -> Option<f64>) -> Vec<&R> {
     let mut ranked: Vec<(f64, &R)> = rows
         .iter()
         .filter_map(|row| Some((of(row)?.abs(), row)))

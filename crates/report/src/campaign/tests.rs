@@ -13,131 +13,138 @@ fn rows(count: usize) -> CampaignRows {
     let mut random = Random::new(1, "rows of a campaign");
     let mut rows = CampaignRows::default();
     for number in 0..count {
-        let site = format!("e{number:05}_e{:05}", number + 1);
-        let phase = format!("E{:02}", number % 24);
-        let failed = number % 100 == 7;
-        let is_valid = !failed && number % 100 != 8;
-        let verdict = if is_valid {
-            "valid with remarks"
-        } else {
-            "INVALID"
-        };
-        let text = |text: &str| vec![text.repeat(20)];
-        let kernels = KernelSetName {
-            name: format!("ext{}.bsp", number / 500),
-            blake3: String::new(),
-        };
-        rows.sites.push(SiteRow {
-            site: site.clone(),
-            phase: phase.clone(),
-            state: if failed {
-                SiteState::Failed
-            } else {
-                SiteState::Published
-            },
-            verdict: if failed { "" } else { verdict },
-            is_valid,
-            reasons: if is_valid || failed {
-                Vec::new()
-            } else {
-                text("mean of <ranges>; ")
-            },
-            remarks: text("a remark; "),
-            failure: if failed {
-                "a kernel & more are gone".repeat(30)
-            } else {
-                String::new()
-            },
-            body: Body::Mars,
-            place_rad: Some([random.between(0.0, 6.28), random.between(-1.5, 1.5)]),
-            images: 2,
-            pairs: 1,
-            profiles: 2,
-            ties: 100,
-            footprints: 300,
-            kernels: kernels.clone(),
-            configuration_blake3: String::new(),
-            fingerprint: String::new(),
-            version: String::new(),
-        });
-        let moments = ResidualMoments {
-            mean_x: 20.0,
-            deviation_x: 1.0,
-            mean_y: 2.0,
-            deviation_y: 0.3,
-        };
-        let mut state = |size_m: f64| {
-            let along_m = size_m * random.normal();
-            PairState {
-                ties: 100,
-                ties_along_m: None,
-                along_track_parallax_m: along_m.abs(),
-                residuals: [moments; 2],
-                misregistration: Some(PairMisregistration {
-                    footprints: 80,
-                    along_lines: along_m / 4.0,
-                    along_m: Measured {
-                        value: along_m,
-                        sigma: Some(1.0),
-                    },
-                    across_px: 1.0,
-                    across_m: Measured {
-                        value: 4.0,
-                        sigma: None,
-                    },
-                    along_spacings: Some(along_m / 300.0),
-                }),
-                heights: None,
-            }
-        };
-        rows.pairs.push(PairRow {
-            site: site.clone(),
-            verdict,
-            is_valid,
-            is_repeated: false,
-            images: [0, 1].map(|image| format!("E{image}-{number:05}")),
-            phases: [phase.clone(), phase.clone()],
-            utc_start: [0, 1].map(|day| format!("2001-{:03}T01:00:00", 1 + number % 300 + day)),
-            emission_rad: [Some(0.0), Some(0.3)],
-            latitude_rad: Some(0.1),
-            summing: [2, 2],
-            convergence_rad: 0.35,
-            height_over_base: 2.5,
-            pixel_size_m: 4.4,
-            shot_spacing_m: Some(300.0),
-            clock_m_s: None,
-            before: state(200.0),
-            after: Some(state(2.0)),
-            budget: Err("no budget".to_owned()),
-            kernels: kernels.clone(),
-        });
-        for orbit in [1, 2] {
-            rows.profiles.push(ProfileRow {
-                site: site.clone(),
-                verdict,
-                is_valid,
-                phase: phase.clone(),
-                profile: format!("window/{orbit}"),
-                orbit,
-                image: String::new(),
-                off_nadir_rad: 0.0,
-                ranges: RangeStatistics {
-                    n: 150,
-                    mean_m: random.normal(),
-                    deviation_m: 0.3,
-                },
-                mean_without_outliers_m: random.normal(),
-                outliers: 0,
-                in_image: RangeStatistics::default(),
-                spacecraft_m: [0.0; 3],
-                is_judged: true,
-                invalid_because: String::new(),
-                rejected_because: String::new(),
-                kernels: kernels.clone(),
-            });
-        }
+        let site = site(number, &mut random);
+        rows.pairs.push(pair(&site, number, &mut random));
+        rows.profiles
+            .extend([1, 2].map(|orbit| profile(&site, orbit, &mut random)));
+        rows.sites.push(site);
     }
     rows
+}
+
+fn site(number: usize, random: &mut Random) -> SiteRow {
+    let failed = number % 100 == 7;
+    let is_valid = !failed && number % 100 != 8;
+    let verdict = match (failed, is_valid) {
+        (true, _) => "",
+        (false, true) => "valid with remarks",
+        (false, false) => "INVALID",
+    };
+    let text = |is_there: bool, text: &str| {
+        let lines = is_there.then(|| text.repeat(20));
+        lines.into_iter().collect::<Vec<String>>()
+    };
+    SiteRow {
+        site: format!("e{number:05}_e{:05}", number + 1),
+        phase: format!("E{:02}", number % 24),
+        state: if failed {
+            SiteState::Failed
+        } else {
+            SiteState::Published
+        },
+        verdict,
+        is_valid,
+        reasons: text(!is_valid && !failed, "mean of <ranges>; "),
+        remarks: text(true, "a remark; "),
+        failure: text(failed, "a kernel & more are gone; ").concat(),
+        body: Body::Mars,
+        place_rad: Some([
+            random.between(0.0, std::f64::consts::TAU),
+            random.between(-1.5, 1.5),
+        ]),
+        images: 2,
+        pairs: 1,
+        profiles: 2,
+        ties: 100,
+        footprints: 300,
+        kernels: KernelSetName {
+            name: format!("ext{}.bsp", number / 500),
+            blake3: String::new(),
+        },
+        configuration_blake3: String::new(),
+        fingerprint: String::new(),
+        version: String::new(),
+    }
+}
+
+fn state(along_m: f64) -> PairState {
+    let moments = ResidualMoments {
+        mean_x: 20.0,
+        deviation_x: 1.0,
+        mean_y: 2.0,
+        deviation_y: 0.3,
+    };
+    PairState {
+        ties: 100,
+        ties_along_m: None,
+        along_track_parallax_m: along_m.abs(),
+        residuals: [moments; 2],
+        misregistration: Some(PairMisregistration {
+            footprints: 80,
+            along_lines: along_m / 4.0,
+            along_m: Measured {
+                value: along_m,
+                sigma: Some(1.0),
+            },
+            across_px: 1.0,
+            across_m: Measured {
+                value: 4.0,
+                sigma: None,
+            },
+            along_spacings: Some(along_m / 300.0),
+        }),
+        heights: None,
+    }
+}
+
+fn pair(site: &SiteRow, number: usize, random: &mut Random) -> PairRow {
+    PairRow {
+        site: site.site.clone(),
+        verdict: site.verdict,
+        is_valid: site.is_valid,
+        is_repeated: false,
+        images: [0, 1].map(|image| format!("E{image}-{number:05}")),
+        phases: [site.phase.clone(), site.phase.clone()],
+        utc_start: [0, 1].map(|day| format!("2001-{:03}T01:00:00", 1 + number % 300 + day)),
+        emission_rad: [Some(0.0), Some(0.3)],
+        latitude_rad: Some(0.1),
+        summing: [2, 2],
+        convergence_rad: 0.35,
+        height_over_base: 2.5,
+        pixel_size_m: 4.4,
+        shot_spacing_m: Some(300.0),
+        clock_m_s: None,
+        before: state(200.0 * random.normal()),
+        after: Some(state(2.0 * random.normal())),
+        budget: Err("no budget".to_owned()),
+        kernels: site.kernels.clone(),
+    }
+}
+
+fn profile(site: &SiteRow, orbit: u32, random: &mut Random) -> ProfileRow {
+    ProfileRow {
+        site: site.site.clone(),
+        verdict: site.verdict,
+        is_valid: site.is_valid,
+        phase: site.phase.clone(),
+        profile: format!("window/{orbit}"),
+        orbit,
+        image: String::new(),
+        off_nadir_rad: 0.0,
+        ranges: RangeStatistics {
+            n: 150,
+            mean_m: random.normal(),
+            deviation_m: 0.3,
+        },
+        mean_without_outliers_m: random.normal(),
+        outliers: 0,
+        in_image: RangeStatistics::default(),
+        spacecraft_m: [0.0; 3],
+        is_judged: true,
+        invalid_because: String::new(),
+        rejected_because: String::new(),
+        kernels: site.kernels.clone(),
+    }
 }
 
 #[test]
@@ -163,19 +170,18 @@ fn the_page_of_ten_thousand_sites_is_below_a_megabyte() {
 #[test]
 fn a_biased_phase_is_named_on_the_first_screen() {
     let mut rows = rows(480);
-    for pair in rows.pairs.iter_mut().filter(|pair| pair.phases[0] == "E05") {
-        for found in [&mut pair.before.misregistration] {
-            if let Some(found) = found {
-                found.along_m.value = 400.0 + 0.1 * found.along_m.value;
-            }
-        }
+    let biased = rows.pairs.iter_mut();
+    for pair in biased.filter(|pair| pair.phases[0] == "E05") {
+        let found = pair.before.misregistration.as_mut().unwrap();
+        found.along_m.value = 450.0 + 0.1 * found.along_m.value;
     }
     let summary = pool_sites("test", &rows);
     let page = campaign_page(&summary, &rows).unwrap();
     let lead = page.split("<section").next().unwrap();
     assert!(
         lead.contains("differs from zero in 1 mission phase: E05 (+4"),
-        "{lead:.900}"
+        "{}",
+        &lead[lead.len().saturating_sub(900)..]
     );
     assert!(lead.contains("It does not differ from zero in 23 mission phases."));
 }

@@ -6,7 +6,7 @@ use super::rows::{
     Measured, PairHeights, PairMisregistration, PairState, PolynomialRmse, RangeStatistics,
 };
 use crate::{
-    check_heights::HeightCheck,
+    check_heights::{HeightCheck, TieHeight},
     check_ranges::RangeCheck,
     compare_pairs::{FootprintsByTies, PairComparison, ProfileByTies},
     fit_sensor_model::EulerModel,
@@ -195,7 +195,7 @@ impl PairHeights {
             images.iter().all(|image| of.contains(image))
         };
         let above_m = heights.ties.iter().filter(|height| has_both(height.tie));
-        let above_m: Vec<f64> = above_m.map(|height| height.above_m()).collect();
+        let above_m: Vec<f64> = above_m.map(TieHeight::above_m).collect();
         let n = above_m.len() as f64;
         (n > 0.0).then(|| Self {
             n: u32::try_from(above_m.len()).unwrap_or(u32::MAX),
