@@ -91,7 +91,6 @@ fn a_changed_kernel_touches_the_sites_of_its_phase() {
     let sites = processed(&first);
     assert_eq!(sites.len(), PAIRS + SINGLES);
     assert_eq!(first["left_out"], Value::Array(Vec::new()));
-    let before = all_products(&case, "out");
 
     // A site of the campaign is a site like any other.
     let site = sites.iter().find(|site| site.contains('_')).unwrap();
@@ -101,6 +100,7 @@ fn a_changed_kernel_touches_the_sites_of_its_phase() {
     let again = String::from_utf8(again.unwrap().stdout).unwrap();
     assert!(again.contains("nothing changed"), "{again}");
 
+    let before = all_products(&case, "out");
     let again = answer(&mut command(&case, "out"));
     assert!(processed(&again).is_empty(), "{again}");
     assert_eq!(all_products(&case, "out"), before);

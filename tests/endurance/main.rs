@@ -1,6 +1,7 @@
 //! Runs that are changed, killed and taken up again.
 
 mod changes;
+mod cluster;
 #[path = "../common/mod.rs"]
 mod common;
 mod killed;

@@ -107,7 +107,7 @@ fn biases(summary: &CampaignSummary) -> Markup {
     }
     if !free.is_empty() {
         sentences.push(format!(
-            "It does not differ from zero in {}.",
+            "No mean along-track misregistration was detected in {}.",
             counted(free.len(), "mission phase")
         ));
     }
@@ -193,7 +193,7 @@ fn key_numbers(summary: &CampaignSummary) -> Markup {
 fn decided(mean: &RobustMean) -> &'static str {
     match mean.differs_from_zero() {
         Some(true) => "differs from zero",
-        Some(false) => "does not differ from zero",
+        Some(false) => "no difference from zero detected",
         None => "too few independent pairs for a decision",
     }
 }
