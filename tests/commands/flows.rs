@@ -39,8 +39,9 @@ fn a_plan_of_a_net_and_of_a_calibration_says_what_a_run_does() {
     let case = written();
     let both = ["plan", NET, LINES];
     let first = [
-        "synthetic_net: 2 of 2 stages would run: no earlier output",
+        "synthetic_net: 3 of 3 stages would run: no earlier output",
         "run triangulate no earlier output",
+        "run map_pictures no earlier output",
         "run publish no earlier output",
         "synthetic_lines: 2 of 2 stages would run: no earlier output",
         "run calibrate no earlier output",
@@ -111,7 +112,8 @@ fn a_flow_stops_after_the_stage_that_is_named() {
     assert!(!case.path("out/synthetic_net/manifest.json").exists());
     let rest = plan(&case, &["triangulate", NET, "--plan"]);
     assert_eq!(rest[1], "keep triangulate nothing changed");
-    assert_eq!(rest[2], "run publish no earlier output");
+    assert_eq!(rest[2], "run map_pictures no earlier output");
+    assert_eq!(rest[3], "run publish no earlier output");
     let unknown = told(&case, &["calibrate", LINES, "--until", "map_surface"]);
     assert!(unknown.starts_with("exit 2"), "{unknown}");
     let expected = "--until is \"map_surface\"; expected a stage of this flow: calibrate, publish";

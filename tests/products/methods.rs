@@ -350,8 +350,8 @@ fn methods_that_are_called_are_inputs() {
     let counts = RUNS
         .iter()
         .map(|run| inputs_that_are_methods(run, &declared));
-    // Two of the check of archives, one of the match with the laser, one of the joined terrain models.
-    assert_eq!(counts.sum::<usize>(), 4);
+    // Two of the check of archives, one of the match with the laser, one of the joined terrain models, two of the mosaic of a net.
+    assert_eq!(counts.sum::<usize>(), 6);
 }
 
 /// What the ledger lets pass and what it refuses, on rows that are invented.

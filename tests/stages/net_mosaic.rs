@@ -1,4 +1,10 @@
 //! The mosaic of a synthetic net, whose ground has a known brightness at every place of the map.
+#![allow(
+    clippy::disallowed_methods,
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "helpers of tests work in temporary folders and may fail loudly"
+)]
 
 use std::{fs, path::Path};
 
@@ -21,6 +27,9 @@ const SEED: u64 = 3;
 const APART: usize = 40;
 const REACH: i64 = 10;
 const HALF: i64 = 6;
+
+/// Changes the fields of a row of the table of pictures.
+type Change<'a> = &'a dyn Fn(&mut Vec<String>);
 
 fn scene() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
@@ -233,11 +242,34 @@ fn pictures_lie_on_the_map_where_they_state() {
     assert!(
         page.contains("Mosaic of the pictures, north up") && page.contains("mosaic_source.tif")
     );
-    as_gdal_reads_it(&out.join("mosaic.tif"), &mosaic);
+    as_gdal_reads_it(&out.join("mosaic.tif"), &mosaic, &["Mercator"]);
+}
+
+#[test]
+fn a_stereographic_map_is_that_of_the_mosaic() {
+    let folder = scene();
+    let toml = folder.path().join("net/net.toml");
+    let text = fs::read_to_string(&toml).unwrap();
+    let (was, is) = (
+        "[map]\nlatitude_deg = 0.0\nlongitude_deg = 0.0",
+        "[map]\nprojection = \"stereographic\"\nlatitude_deg = -40.0\nlongitude_deg = 120.0\ncell_m = 500.0",
+    );
+    assert!(text.contains(was), "{text}");
+    fs::write(&toml, text.replace(was, is)).unwrap();
+    run(folder.path()).unwrap();
+    let path = folder.path().join("out/synthetic_net/mosaic.tif");
+    let mosaic = OnMap::of(&path);
+    assert!((mosaic.cell_m - 500.0).abs() < 1e-6);
+    let names = [
+        "Stereographic",
+        "\"Latitude of natural origin\",-40,",
+        "\"Longitude of natural origin\",120,",
+    ];
+    as_gdal_reads_it(&path, &mosaic, &names);
 }
 
 /// The map and its extent, by GDAL where it is installed.
-fn as_gdal_reads_it(path: &Path, mosaic: &OnMap) {
+fn as_gdal_reads_it(path: &Path, mosaic: &OnMap, names: &[&str]) {
     let Some(mut gdalinfo) = program("gdalinfo", "the mosaic of a net in GDAL") else {
         return;
     };
@@ -245,7 +277,8 @@ fn as_gdal_reads_it(path: &Path, mosaic: &OnMap) {
     let text = String::from_utf8(text).unwrap();
     let found: Value = serde_json::from_str(&text).unwrap();
     let wkt = found["coordinateSystem"]["wkt"].as_str().unwrap();
-    assert!(wkt.contains("Mercator") && wkt.contains("3396190"), "{wkt}");
+    let has_names = names.iter().all(|name| wkt.contains(name));
+    assert!(has_names && wkt.contains("3396190"), "{wkt}");
     let transform = found["geoTransform"].as_array().unwrap();
     let expected = [
         mosaic.edges_m[0],
@@ -302,7 +335,7 @@ fn the_direction_of_y_does_not_change_the_mosaic() {
 
 #[test]
 fn images_that_do_not_fit_are_refused() {
-    let refused = |change: &dyn Fn(&mut Vec<String>)| {
+    let refused = |change: Change<'_>| {
         let folder = scene();
         change_pictures(folder.path(), change);
         run(folder.path()).unwrap_err().to_string()
@@ -317,11 +350,11 @@ fn images_that_do_not_fit_are_refused() {
         "{message}"
     );
     // A corner far away, and pixels of half the size.
-    let changes: [(usize, fn(f64) -> f64); 2] = [(5, |y| y + 1e4), (6, |units| 0.5 * units)];
-    for (field, changed) in changes {
+    for (field, scale, shift) in [(5, 1.0, 1e4), (6, 0.5, 0.0)] {
         let message = refused(&|fields| {
             if fields[0] == "P03" {
-                fields[field] = changed(fields[field].parse().unwrap()).to_string();
+                let number: f64 = fields[field].parse().unwrap();
+                fields[field] = (scale * number + shift).to_string();
             }
         });
         assert!(

@@ -254,7 +254,7 @@ impl<N: Number + Send + Sync> GeoTiff<'_, N> {
     }
 }
 
-/// A coordinate system as GeoTIFF keys, with the numbers and names to which they refer.
+/// A coordinate system as keys of the file, with the numbers and names to which they refer.
 struct MapKeys {
     /// The sphere, in words.
     sphere: String,

@@ -105,9 +105,14 @@ impl Draft {
 }
 
 /// Writes a text file.
-pub(super) fn put(path: &Path, contents: impl AsRef<[u8]>) -> Result<()> {
+pub(super) fn put(path: &Path, text: &str) -> Result<()> {
+    put_bytes(path, text.as_bytes())
+}
+
+/// Writes a file of a scene.
+pub(super) fn put_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
     File::create(path)
-        .and_then(|mut file| file.write_all(contents.as_ref()))
+        .and_then(|mut file| file.write_all(bytes))
         .map_err(IoError::on("write"))
         .in_file(path)
 }

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::{
     error::SceneError,
-    files::{Draft, put},
+    files::{Draft, put, put_bytes},
     plane_net::{PlaneRecipe, PlaneScene},
     plane_pictures::Ground,
     random::Random,
@@ -67,7 +67,7 @@ pub fn write_plane_scene(directory: &Path, seed: u64) -> Result<String> {
     for (control, error_m) in gross.iter().zip(GROSS_M) {
         scene.net.controls[*control].at += Place::new(0.0, error_m);
     }
-    let picture = |index: usize| format!("P{:02}", index + 1);
+    let picture = name_of;
     let point = |index: usize| format!("{}", index + 1);
     let mut measurements = "picture,point,x,y\n".to_owned();
     for of in &scene.net.measurements {
@@ -92,39 +92,7 @@ pub fn write_plane_scene(directory: &Path, seed: u64) -> Result<String> {
         );
     }
     let ground = Ground::new(seed);
-    let images = draft.folder("images")?;
-    let mut pictures =
-        "picture,brick,metres_per_unit,image,image_x,image_y,pixel_units\n".to_owned();
-    for (index, way) in scene.pictures.iter().enumerate() {
-        // Three bricks of neighbouring columns.
-        let [column, row] = [index % RECIPE.grid[0], index / RECIPE.grid[0]];
-        let brick = ["west", "middle", "east"][column * 3 / RECIPE.grid[0]];
-        let (name, scale) = (picture(index), way.scale());
-        let _infallible = write!(pictures, "{name},{brick},{scale:.3}");
-        if column.max(row) >= WITH_PIXELS {
-            pictures += ",,,,\n";
-            continue;
-        }
-        let middle_m = Place::new(column as f64, row as f64) * RECIPE.spacing_m;
-        let contrast = if (column + row) % 2 == 0 {
-            1.0
-        } else {
-            CONTRAST
-        };
-        let path = images.join(format!("{name}.tif"));
-        let image = ground.picture(way, middle_m, RECIPE.side_m, contrast);
-        let image = image.map_err(|refusal| SceneError::Image {
-            image: name.clone(),
-            error: refusal.to_string(),
-        });
-        let image = image.in_file(&path)?;
-        put(&path, &image.tiff)?;
-        let _infallible = writeln!(
-            pictures,
-            ",images/{name}.tif,{:.6},{:.6},{:.9}",
-            image.corner.re, image.corner.im, image.pixel_units
-        );
-    }
+    let pictures = pictures(&draft, &scene, &ground)?;
     let truth = Truth {
         seed,
         noise_m: RECIPE.noise_m,
@@ -179,6 +147,49 @@ pub fn write_plane_scene(directory: &Path, seed: u64) -> Result<String> {
         scene.net.measurements.len(),
         directory.join("net.toml").display()
     ))
+}
+
+/// The table of the pictures; images of some of them are written.
+fn pictures(draft: &Draft, scene: &PlaneScene, ground: &Ground) -> Result<String> {
+    let images = draft.folder("images")?;
+    let mut pictures =
+        "picture,brick,metres_per_unit,image,image_x,image_y,pixel_units\n".to_owned();
+    for (index, way) in scene.pictures.iter().enumerate() {
+        // Three bricks of neighbouring columns.
+        let [column, row] = [index % RECIPE.grid[0], index / RECIPE.grid[0]];
+        let brick = ["west", "middle", "east"][column * 3 / RECIPE.grid[0]];
+        let (name, scale) = (name_of(index), way.scale());
+        let _infallible = write!(pictures, "{name},{brick},{scale:.3}");
+        if column.max(row) >= WITH_PIXELS {
+            pictures += ",,,,\n";
+            continue;
+        }
+        let middle_m = Place::new(column as f64, row as f64) * RECIPE.spacing_m;
+        let contrast = if (column + row) % 2 == 0 {
+            1.0
+        } else {
+            CONTRAST
+        };
+        let path = images.join(format!("{name}.tif"));
+        let image = ground.picture(way, middle_m, RECIPE.side_m, contrast);
+        let image = image.map_err(|refusal| SceneError::Image {
+            image: name.clone(),
+            error: refusal.to_string(),
+        });
+        let image = image.in_file(&path)?;
+        put_bytes(&path, &image.tiff)?;
+        let _infallible = writeln!(
+            pictures,
+            ",images/{name}.tif,{:.6},{:.6},{:.9}",
+            image.corner.re, image.corner.im, image.pixel_units
+        );
+    }
+    Ok(pictures)
+}
+
+/// Name of the picture with this index.
+fn name_of(index: usize) -> String {
+    format!("P{:02}", index + 1)
 }
 
 const NET: &str = "\

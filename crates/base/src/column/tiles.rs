@@ -12,9 +12,9 @@ pub const TILE: usize = 256;
 
 /// Bytes on the cells of a grid, row by row, in square tiles of which few are in memory.
 ///
-/// All tiles of a process beyond [`MEMORY_BYTES`](super::MEMORY_BYTES) lie in an unnamed temporary file, and a tile of zeros lies
-/// nowhere: it is all that an image rarely covers of a map. A clone shares the tiles. A tile that the temporary file does not return ends the
-/// task by unwinding; see [`lost_values`](super::lost_values).
+/// All tiles of a process beyond [`MEMORY_BYTES`](super::MEMORY_BYTES) lie in an unnamed temporary file; a tile of zeros takes no
+/// room. A clone shares the tiles. A tile that the temporary file does not return ends the task by unwinding; see
+/// [`lost_values`](super::lost_values).
 ///
 /// ```
 /// use areograph_base::column::Tiles;
@@ -167,9 +167,10 @@ impl Tiles {
         columns: &Range<usize>,
     ) -> impl Iterator<Item = usize> + use<> {
         let across = self.size[1].div_ceil(TILE);
-        let span = |of: &Range<usize>| match of.is_empty() {
-            true => 0..0,
-            false => of.start / TILE..of.end.div_ceil(TILE),
+        let span = |of: &Range<usize>| {
+            let start = of.start / TILE;
+            let end = of.end.div_ceil(TILE);
+            start..if of.is_empty() { start } else { end }
         };
         let (down, right) = (span(rows), span(columns));
         down.flat_map(move |row| right.clone().map(move |column| row * across + column))
@@ -266,7 +267,7 @@ mod tests {
             if is_empty {
                 0
             } else {
-                (row * 7 + column * 3) as u8
+                u8::try_from((row * 7 + column * 3) % 256).unwrap()
             }
         };
         (0..SIZE[0] * SIZE[1]).map(cell).collect()
@@ -297,9 +298,9 @@ mod tests {
         let filled = tiles.filled_window(&(3..4), &(TILE - 1..TILE + 1)).unwrap();
         assert_eq!(filled, [bytes[3 * SIZE[1] + TILE - 1], 0]);
         let mut counts = [0; 256];
-        bytes
-            .iter()
-            .for_each(|byte| counts[usize::from(*byte)] += 1);
+        for byte in &bytes {
+            counts[usize::from(*byte)] += 1;
+        }
         assert_eq!(tiles.counts(), counts);
         let made = spans(SIZE)
             .into_iter()

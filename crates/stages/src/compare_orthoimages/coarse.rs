@@ -32,6 +32,12 @@ impl Levels {
         Self { each }
     }
 
+    /// Edges of the cells of the levels, cells of the orthoimages.
+    #[cfg(test)]
+    pub(super) fn edges(&self) -> Vec<u32> {
+        self.each.iter().map(|(edge, _)| *edge).collect()
+    }
+
     /// The shift of a place within `reach` of the shift `by`, within [`NEAR`]; `None` where no level decides: a square that is
     /// not complete, or no distinct peak.
     pub(super) fn near(&self, middle: [i64; 2], by: [i64; 2], reach: u32) -> Option<[i64; 2]> {

@@ -114,6 +114,43 @@ fn coarse_cells_lead_to_the_offsets_of_one_window() {
     assert!(matching >= 100 && led * 3 >= matching);
 }
 
+/// A window that is searched in cells of 16, then of 4, then of 1.
+#[test]
+fn several_levels_lead_to_a_shift_that_no_level_searches_at_once() {
+    const REACH: u32 = 200;
+    let waves = &waves_to(1_500.0)[..24];
+    let (size, by) = ([1_100, 1_100], [151, -87]);
+    let one = orthoimage(0, [0, 0], size, |cell| {
+        ground(waves, cell.map(|at| at as f64))
+    });
+    let other = orthoimage(1, [0, 0], size, |cell| {
+        ground(waves, [0, 1].map(|axis| (cell[axis] - by[axis]) as f64))
+    });
+    let cells = [&one, &other].map(|of| of.brightness.bytes());
+    let [first, second] = [(&one, &cells[0]), (&other, &cells[1])]
+        .map(|(of, cells)| Raster::of(&of.account.map, cells));
+    let levels = Levels::of([&first, &second], REACH);
+    assert_eq!(levels.edges(), [4, 16]);
+    let pair = Pair {
+        account: &one.account,
+        one: first,
+        other: second,
+    };
+    for middle in [[550, 550], [530, 570], [565, 541]] {
+        let near = levels.near(middle, [0, 0], REACH).unwrap();
+        let is_near = (0..2).all(|axis| near[axis].abs_diff(by[axis]) < u64::from(NEAR));
+        assert!(is_near, "{middle:?}: {near:?}");
+        let template = pair.one.square(middle.map(|at| at - i64::from(HALF)), EDGE);
+        let found = pair
+            .matched(&template.unwrap(), middle, near, NEAR)
+            .unwrap();
+        for (axis, expected) in [by[1], -by[0]].into_iter().enumerate() {
+            let error_m = found.offset_m[axis] - expected as f64 * CELL_M;
+            assert!(error_m.abs() < 0.1 * CELL_M, "{found:?}");
+        }
+    }
+}
+
 #[test]
 fn other_ground_does_not_match() {
     let waves: Vec<[f64; 4]> = waves()

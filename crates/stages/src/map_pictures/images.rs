@@ -1,6 +1,6 @@
 //! The images of the pictures of a net.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use areograph_base::error::{Cause, Locate as _, Result};
 use areograph_config::{NetConfig, YAxis};
@@ -112,15 +112,20 @@ pub fn picture_images(config: &NetConfig) -> Result<Vec<PictureImage>> {
 
 fn one(
     config: &NetConfig,
-    table: &std::path::Path,
+    table: &Path,
     picture: String,
     image: ImageOfPicture,
 ) -> std::result::Result<PictureImage, PicturesError> {
     if !config.film.files.is_empty() {
         return Err(PicturesError::Film { picture });
     }
-    let folder = table.parent().unwrap_or_else(|| std::path::Path::new(""));
-    let path = folder.join(&image.file);
+    let folder = table.parent().unwrap_or_else(|| Path::new(""));
+    let ImageOfPicture {
+        file,
+        corner,
+        pixel_units,
+    } = image;
+    let path = folder.join(file);
     if !path.is_file() {
         let file = file_name(&path);
         return Err(PicturesError::Missing { picture, file });
@@ -128,7 +133,7 @@ fn one(
     Ok(PictureImage {
         picture,
         path,
-        corner: image.corner,
-        pixel_units: image.pixel_units,
+        corner,
+        pixel_units,
     })
 }

@@ -98,7 +98,7 @@ fn an_output_whose_bytes_are_read_as_they_are_needed_is_the_same() {
         "Gusev".to_owned(),
         (0..9_000).collect(),
         (0..40_000).map(f64::from).collect(),
-        Tiles::of([300, 300], &[7; 90_000]),
+        Tiles::of([100, 100], &[7; 10_000]),
         Some('σ'),
     );
     cache.store("search", Inputs::new(1), rows.clone()).unwrap();
