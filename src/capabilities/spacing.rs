@@ -44,11 +44,7 @@ use crate::{
     schema::DocumentSchema,
     stage::{Output, Stage},
     stage_inputs,
-    stages::{
-        convert_datum::Converted,
-        group_profiles::{Profile, windows_of},
-        judge::Findings,
-    },
+    stages::{convert_datum::Converted, group_profiles::Profile, judge::Findings},
     store::book::Book,
     verdict::{Check, CheckKind, CheckOutcome::Warning},
 };
@@ -99,7 +95,7 @@ impl Stage for MeasureSpacing<'_> {
             files.map(|file| (file, PEDR_PERIOD_S)).collect()
         };
         let spacings = profiles.iter().map(|of| {
-            let seen_in = windows_of(footprints, &of.rows);
+            let seen_in = footprints.windows_of(&of.rows);
             let windows = self.windows.iter().enumerate();
             let own = windows.filter(|(bit, _)| seen_in >> bit & 1 == 1);
             let regions: Option<Vec<Region>> =

@@ -251,6 +251,16 @@ impl<D> Footprints<D> {
         self.radius_crossover_m.at(row) - self.areoid_radius_m.at(row)
     }
 
+    /// The windows that contain at least one of these rows, as bits in the order of the site's windows.
+    ///
+    /// # Panics
+    /// If a row does not exist.
+    #[must_use]
+    pub fn windows_of(&self, rows: &[u32]) -> u64 {
+        let masks = rows.iter().map(|row| self.windows.at(*row as usize));
+        masks.fold(0, |all, mask| all | mask)
+    }
+
     /// Radius of the ground by the shot in row `row`, metres: the one that all stages use.
     ///
     /// # Panics

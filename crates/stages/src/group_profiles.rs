@@ -129,7 +129,7 @@ pub fn group_profiles(
         });
         let first_of_group = profiles.len();
         for rows in crossings {
-            let seen_in = windows_of(footprints, rows);
+            let seen_in = footprints.windows_of(rows);
             let window = windows.get(seen_in.trailing_zeros() as usize);
             let window = window.map_or("", |window| &*window.id);
             let orbit = footprints.orbit.at(rows[0] as usize);
@@ -141,13 +141,6 @@ pub fn group_profiles(
         }
     }
     profiles
-}
-
-/// The windows of some rows as bits.
-#[must_use]
-pub fn windows_of(footprints: &Footprints<BodyFixed>, rows: &[u32]) -> u64 {
-    let masks = rows.iter().map(|row| footprints.windows.at(*row as usize));
-    masks.fold(0, |all, mask| all | mask)
 }
 
 /// Sets of windows that share footprints, as bits, in the order of their first windows.

@@ -6,7 +6,7 @@ mod task;
 
 use std::{
     collections::BTreeSet,
-    path::PathBuf,
+    path::{Path, PathBuf},
     process::ExitCode,
     sync::{Arc, atomic::AtomicBool},
 };
@@ -23,11 +23,11 @@ use crate::{
     config::ExecutorKind,
     error::{Cause, Kind, Locate as _, Result, Stopped},
     flow::{
-        Campaign, Costs, PlannedSite, RunOptions, SiteEnd, check_out, publish_results,
+        CAMPAIGN, Campaign, Costs, PlannedSite, RunOptions, SiteEnd, check_out, publish_results,
         run_site_file, select_campaign,
     },
     service::words::counted,
-    store::hashes::HashCache,
+    store::{hashes::HashCache, publish::read_manifest},
     watch::Count,
 };
 
@@ -80,6 +80,11 @@ enum NotRun {
     #[error("the rules select {0}, but no pair of them")]
     #[cause(Configuration: "relax [pairs], or set pairs.singles = true")]
     NoPair(String),
+    #[error(
+        "this folder contains the results of the campaign {found:?}; expected those of {own:?} or none"
+    )]
+    #[cause(Configuration: "give each campaign its own --out")]
+    OtherCampaign { found: String, own: String },
 }
 
 pub(super) fn run(arguments: &Arguments) -> ExitCode {
@@ -101,6 +106,7 @@ fn ran(arguments: &Arguments) -> Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     check_out(&arguments.out, &[])?;
+    is_own_folder(&campaign, &arguments.out)?;
     limit_threads(arguments.threads);
     if arguments.only.is_empty() {
         for stale in campaign.remove_stale_site_files(&arguments.out)? {
@@ -114,7 +120,7 @@ fn ran(arguments: &Arguments) -> Result<ExitCode> {
         .filter(|number| is_wanted(&campaign.sites[*number]))
         .collect();
     let ended = match campaign.config.executor.kind {
-        ExecutorKind::Local => on_this_machine(&campaign, wanted, arguments)?,
+        ExecutorKind::Local => on_this_machine(&campaign, &wanted, arguments)?,
         ExecutorKind::Slurm => slurm::run_sites(&campaign, &wanted, &arguments.out)?,
     };
     let interrupted = Kind::Interrupted.exit_code();
@@ -152,10 +158,23 @@ fn is_selected(campaign: &Campaign, arguments: &Arguments) -> std::result::Resul
     Ok(())
 }
 
+/// Refuses the folder of another campaign, whose site files and results would be replaced.
+fn is_own_folder(campaign: &Campaign, out: &Path) -> Result<()> {
+    let folder = out.join(CAMPAIGN);
+    let own = &campaign.config.campaign;
+    match read_manifest(&folder).map(|manifest| manifest.site) {
+        Some(found) if found != *own => {
+            let own = own.clone();
+            Err(NotRun::OtherCampaign { found, own }).in_file(folder)
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Runs the sites on this machine; they are returned in their order.
 fn on_this_machine(
     campaign: &Arc<Campaign>,
-    sites: Vec<usize>,
+    sites: &[usize],
     arguments: &Arguments,
 ) -> Result<Vec<SiteEnd>> {
     let hashes = HashCache::in_folder(&arguments.out, arguments.rehash);

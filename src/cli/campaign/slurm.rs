@@ -36,7 +36,7 @@ const POLL: Duration = Duration::from_secs(2);
 /// later than the end of its task.
 const SETTLED: Duration = Duration::from_secs(10);
 /// The controller of the cluster may not answer for this time.
-const SILENT: Duration = Duration::from_secs(1_800);
+const SILENT: Duration = Duration::from_mins(30);
 /// Largest index of an array that clusters accept by default is 1000.
 const ARRAY_MAX: usize = 1_000;
 
@@ -82,9 +82,11 @@ pub(super) fn run_sites(campaign: &Campaign, sites: &[usize], out: &Path) -> Res
     let mut ended: BTreeMap<String, SiteEnd> = BTreeMap::new();
     for site in sites.iter().map(|number| &campaign.sites[*number]) {
         match campaign.write_site_file(site, &cluster.out) {
-            Ok(path) => drop(files.insert(&site.id, path)),
+            Ok(path) => {
+                files.insert(&site.id, path);
+            }
             Err(failure) => {
-                drop(ended.insert(site.id.clone(), SiteEnd::failed(&site.id, &failure)))
+                ended.insert(site.id.clone(), SiteEnd::failed(&site.id, &failure));
             }
         }
     }
@@ -96,7 +98,7 @@ pub(super) fn run_sites(campaign: &Campaign, sites: &[usize], out: &Path) -> Res
             let tasks = cluster.write_tasks(attempt, chunk)?;
             let job = cluster.submit(attempt, &tasks)?;
             let already = ended.len();
-            let results = cluster.wait(&job, &tasks, signals.stop(), |done| {
+            let results = Cluster::wait(&job, &tasks, signals.stop(), |done| {
                 progress.count(
                     "run",
                     Count {
@@ -107,7 +109,7 @@ pub(super) fn run_sites(campaign: &Campaign, sites: &[usize], out: &Path) -> Res
                 );
             });
             if let Err(failure) = results {
-                cluster.cancel(&job);
+                Cluster::cancel(&job);
                 return Err(failure);
             }
             ended.extend(results?.into_iter().map(|of| (of.site.clone(), of)));
@@ -162,7 +164,7 @@ impl Cluster<'_> {
     /// Cancels the job of an earlier command that was killed, and empties the folder of tasks.
     fn begin(&self) -> Result<()> {
         if let Ok(job) = fs::read_to_string(self.folder.join(JOB)) {
-            self.cancel(job.trim());
+            Self::cancel(job.trim());
         }
         if self.folder.exists() {
             fs::remove_dir_all(&self.folder)
@@ -229,7 +231,6 @@ impl Cluster<'_> {
     /// Waits until every task has a result or has left the queue, and returns the results; sites that were interrupted have
     /// none.
     fn wait(
-        &self,
         job: &str,
         tasks: &[SiteTask],
         stop: &AtomicBool,
@@ -242,7 +243,7 @@ impl Cluster<'_> {
             if stop.load(Ordering::Relaxed) {
                 return Err(Stopped.into());
             }
-            let queued = match self.queued(job) {
+            let queued = match Self::queued(job) {
                 Ok(queued) => {
                     answered = Instant::now();
                     Some(queued)
@@ -290,7 +291,7 @@ impl Cluster<'_> {
     ///
     /// After a failure of its controller, Slurm may start a task that is running already, and then holds the task until
     /// somebody releases it: held tasks are released.
-    fn queued(&self, job: &str) -> Result<BTreeSet<usize>> {
+    fn queued(job: &str) -> Result<BTreeSet<usize>> {
         let mut squeue = Command::new("squeue");
         squeue.args(["--noheader", "--array", "--format=%K %r", "--me"]);
         squeue.arg(format!("--jobs={job}"));
@@ -317,13 +318,13 @@ impl Cluster<'_> {
 
     /// Cancels a job, and waits until its tasks have left the queue; a cluster that does not answer is left alone, since the
     /// locks of the sites remain.
-    fn cancel(&self, job: &str) {
+    fn cancel(job: &str) {
         if job.is_empty() || answer_of("scancel", Command::new("scancel").arg(job)).is_err() {
             return;
         }
         let begun = Instant::now();
         while begun.elapsed() < 6 * SETTLED
-            && self.queued(job).is_ok_and(|queued| !queued.is_empty())
+            && Self::queued(job).is_ok_and(|queued| !queued.is_empty())
         {
             thread::sleep(POLL);
         }

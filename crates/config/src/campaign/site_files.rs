@@ -239,7 +239,7 @@ ties_min = 7
             std::fs::File::create(path).unwrap();
         }
         let file = folder.path().join("eos.toml");
-        std::fs::write(&file, CAMPAIGN).unwrap();
+        areograph_store::atomic::write(&file, CAMPAIGN.as_bytes()).unwrap();
         (folder, file)
     }
 
