@@ -48,7 +48,7 @@ pub use answers::{check_answer, plan_answer, run_answer};
 pub use archive::{ArchiveRequest, archive_filter, archive_limits};
 pub use campaign::{
     CAMPAIGN, Campaign, CampaignAnswer, CampaignSite, Costs, End, InputSize, LeftOut, PlannedSite,
-    SiteEnd, SiteTask, publish_results, run_site_file, select_campaign,
+    SITES, SiteEnd, SiteTask, publish_results, run_site_file, select_campaign,
 };
 pub use check::{Checked, Extent, FoundProducts, check_site, required_by_site, rival_sets};
 pub use choice::{ChooseKernels, KernelChoice, RivalKernelSets};

@@ -9,7 +9,7 @@
 use crate::common;
 
 use std::{
-    collections::BTreeSet,
+    collections::{BTreeMap, BTreeSet},
     env, fs,
     os::unix::fs::PermissionsExt as _,
     path::{Path, PathBuf},
@@ -73,8 +73,19 @@ fn processed(answer: &Value) -> BTreeSet<String> {
         .collect()
 }
 
+/// States of the sites by the table of sites.
+fn states(case: &Case, out: &str) -> BTreeMap<String, String> {
+    let table = case.path(&format!("{out}/campaign/sites.csv"));
+    let mut rows = csv::Reader::from_path(table).unwrap();
+    let rows = rows.deserialize().map(|row| {
+        let row: BTreeMap<String, String> = row.unwrap();
+        (row["site"].clone(), row["state"].clone())
+    });
+    rows.collect()
+}
+
 /// Products of all sites and of the campaign, without the costs, which are times.
-fn all_products(case: &Case, out: &str) -> std::collections::BTreeMap<PathBuf, Vec<u8>> {
+fn all_products(case: &Case, out: &str) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut found = products(&case.path(out));
     found.remove(Path::new("sites/costs.json"));
     found
@@ -140,6 +151,38 @@ fn a_changed_kernel_touches_the_sites_of_its_phase() {
             .all(|site| site.starts_with(other))
     );
     assert!(!processed(&changed).is_empty());
+
+    // Products of another campaign file and of a failed site are not pooled.
+    case.replace(
+        "scene/campaign.toml",
+        "[pedr]",
+        "[limits]\nties_min = 2\n\n[pedr]",
+    );
+    let one = answer(command(&case, "out").args(["--only", site]));
+    assert_eq!(processed(&one), [site.clone()].into());
+    let states = states(&case, "out");
+    assert_eq!(states[site], "published");
+    assert!(
+        sites
+            .iter()
+            .filter(|of| *of != site)
+            .all(|of| states[of] == "unusable"),
+        "{states:?}"
+    );
+    case.write(&file, "site = \"mine\"\n");
+    let failed = command(&case, "out")
+        .args(["--only", site])
+        .output()
+        .unwrap();
+    assert_eq!(failed.status.code(), Some(2), "{failed:?}");
+    assert_eq!(self::states(&case, "out")[site], "failed");
+    case.replace("scene/campaign.toml", "\"synthetic\"", "\"other\"");
+    let other = command(&case, "out").output().unwrap();
+    let other = String::from_utf8(other.stderr).unwrap();
+    assert!(
+        other.contains("the results of the campaign \"synthetic\""),
+        "{other}"
+    );
 }
 
 #[test]
@@ -248,8 +291,7 @@ exit 0"#,
         ),
         (
             "scancel",
-            r#"while read -r task process; do kill "$process" 2>/dev/null; done <"$state/tasks-$1"
-echo "$1" >>"$state/cancelled""#,
+            r#"while read -r task process; do kill "$process" 2>/dev/null; done <"$state/tasks-$2""#,
         ),
     ];
     for (name, text) in programs {

@@ -119,6 +119,7 @@ fn publish(out: &Path, names: &[&str]) -> CampaignAnswer {
         .map(|name| CampaignSite {
             id: name,
             images: of(name),
+            ..CampaignSite::default()
         })
         .collect();
     publish_results(out, "test", &sites).unwrap()
@@ -473,6 +474,7 @@ fn many_sites_take_little_memory() {
             .map(|name| CampaignSite {
                 id: name,
                 images: Vec::new(),
+                ..CampaignSite::default()
             })
             .collect();
         let started = std::time::Instant::now();

@@ -83,8 +83,7 @@ pub use net::{Blunders, Method, NetConfig, TriangulationConfig, YAxis};
 pub use new_site::NewSite;
 pub use orientation::{OrientationConfig, RegistrationConfig};
 pub use paths::{
-    DEPTH_MAX, PEDR_ENDINGS, SHOT_TABLE_ENDINGS, TIE_ENDINGS, absolute, files_in, seen_from,
-    without_parents,
+    DEPTH_MAX, PEDR_ENDINGS, SHOT_TABLE_ENDINGS, TIE_ENDINGS, absolute, files_in, real, seen_from,
 };
 pub use pedr::PedrConfig;
 pub use pointing::{PointingConfig, UsedBias};

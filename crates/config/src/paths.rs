@@ -326,9 +326,23 @@ pub fn absolute(path: &Path) -> Result<PathBuf, Error> {
     Ok(without_parents(&path))
 }
 
+/// An absolute path without links, as far as it exists: `..` below a link leads elsewhere than the path as written.
+///
+/// # Errors
+/// The current folder cannot be found.
+pub fn real(path: &Path) -> Result<PathBuf, Error> {
+    let path = absolute(path)?;
+    for existing in path.ancestors() {
+        if let (Ok(real), Ok(below)) = (existing.canonicalize(), path.strip_prefix(existing)) {
+            return Ok(real.join(below));
+        }
+    }
+    Ok(path)
+}
+
 /// An absolute path without `.` and `..`, links not followed.
 #[must_use]
-pub fn without_parents(path: &Path) -> PathBuf {
+pub(super) fn without_parents(path: &Path) -> PathBuf {
     let mut steps = PathBuf::new();
     for step in path.components() {
         match step {

@@ -12,6 +12,8 @@ use areograph_store::files::outside;
 
 /// Problems reported one by one; for a file with more, the number of the others is reported.
 const LISTED_MAX: usize = 100;
+/// Words of a warning about a former name.
+pub(super) const IS_NOW_CALLED: &str = "is now called";
 /// Characters of a value that a message repeats.
 const EXCERPT_MAX: usize = 60;
 
@@ -231,7 +233,7 @@ impl<'a> Review<'a> {
         let dot = if table.is_empty() { "" } else { "." };
         self.warn(
             span,
-            format!("{table}{dot}{was} is now called {table}{dot}{name}"),
+            format!("{table}{dot}{was} {IS_NOW_CALLED} {table}{dot}{name}"),
         );
         self.renames.insert(rename);
     }

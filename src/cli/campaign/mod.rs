@@ -6,6 +6,8 @@ mod task;
 
 use std::{
     collections::BTreeSet,
+    ffi::OsString,
+    fs,
     path::{Path, PathBuf},
     process::ExitCode,
     sync::{Arc, atomic::AtomicBool},
@@ -23,11 +25,11 @@ use crate::{
     config::ExecutorKind,
     error::{Cause, Kind, Locate as _, Result, Stopped},
     flow::{
-        CAMPAIGN, Campaign, Costs, PlannedSite, RunOptions, SiteEnd, check_out, publish_results,
-        run_site_file, select_campaign,
+        CAMPAIGN, Campaign, Costs, PlannedSite, RunOptions, SITES, SiteEnd, check_out,
+        publish_results, run_site_file, select_campaign,
     },
     service::words::counted,
-    store::{hashes::HashCache, publish::read_manifest},
+    store::{hashes::HashCache, lock::SiteLock, publish::read_manifest},
     watch::Count,
 };
 
@@ -74,7 +76,10 @@ enum NotRun {
     #[error("the campaign has no site {0:?}")]
     #[cause(Configuration: "list its sites with --plan --json, or omit --only")]
     Unknown(String),
-    #[error("the rules select no image of {0}")]
+    #[error("{site} is left out: {lack}")]
+    #[cause(Input: "provide this file, or change the campaign")]
+    LeftOut { site: String, lack: String },
+    #[error("the rules select none of {0}")]
     #[cause(Configuration: "relax [select] or [[windows]]")]
     NoImage(String),
     #[error("the rules select {0}, but no pair of them")]
@@ -85,6 +90,9 @@ enum NotRun {
     )]
     #[cause(Configuration: "give each campaign its own --out")]
     OtherCampaign { found: String, own: String },
+    #[error("this folder contains {0:?}; expected the results of a campaign, or no folder")]
+    #[cause(Configuration: "move this folder, or name another folder with --out")]
+    Foreign(OsString),
 }
 
 pub(super) fn run(arguments: &Arguments) -> ExitCode {
@@ -107,6 +115,8 @@ fn ran(arguments: &Arguments) -> Result<ExitCode> {
     }
     check_out(&arguments.out, &[])?;
     is_own_folder(&campaign, &arguments.out)?;
+    // Two commands would replace each other's site files and tasks.
+    let _lock = SiteLock::take(&arguments.out.join(SITES))?;
     limit_threads(arguments.threads);
     if arguments.only.is_empty() {
         for stale in campaign.remove_stale_site_files(&arguments.out)? {
@@ -132,14 +142,13 @@ fn ran(arguments: &Arguments) -> Result<ExitCode> {
         .iter()
         .filter_map(SiteEnd::costs)
         .for_each(|of_site| costs.add(of_site));
-    if costs.images > 0 {
-        costs.keep(&arguments.out)?;
+    if costs.images > 0
+        && let Err(failure) = costs.keep(&arguments.out)
+    {
+        tracing::warn!("the costs are not kept for later plans: {failure}");
     }
-    let results = publish_results(
-        &arguments.out,
-        &campaign.config.campaign,
-        &campaign.results_of(),
-    )?;
+    let sites = campaign.results_of(&ended, &arguments.out)?;
+    let results = publish_results(&arguments.out, &campaign.config.campaign, &sites)?;
     Ok(answer::ended(&campaign, &ended, &results, arguments.json))
 }
 
@@ -147,7 +156,14 @@ fn ran(arguments: &Arguments) -> Result<ExitCode> {
 fn is_selected(campaign: &Campaign, arguments: &Arguments) -> std::result::Result<(), NotRun> {
     let is_site = |id: &&String| campaign.sites.iter().any(|site| site.id == **id);
     if let Some(unknown) = arguments.only.iter().find(|id| !is_site(id)) {
-        return Err(NotRun::Unknown(unknown.clone()));
+        let mut left_out = campaign.left_out.iter();
+        return Err(match left_out.find(|of| of.site == *unknown) {
+            Some(of) => NotRun::LeftOut {
+                site: of.site.clone(),
+                lack: of.lack.clone(),
+            },
+            None => NotRun::Unknown(unknown.clone()),
+        });
     }
     if campaign.images.is_empty() {
         return Err(NotRun::NoImage(counted(campaign.excluded, "image")));
@@ -158,17 +174,26 @@ fn is_selected(campaign: &Campaign, arguments: &Arguments) -> std::result::Resul
     Ok(())
 }
 
-/// Refuses the folder of another campaign, whose site files and results would be replaced.
+/// Refuses the folder of another campaign, whose site files and results would be replaced, and a foreign folder in the place
+/// of the results.
 fn is_own_folder(campaign: &Campaign, out: &Path) -> Result<()> {
     let folder = out.join(CAMPAIGN);
     let own = &campaign.config.campaign;
-    match read_manifest(&folder).map(|manifest| manifest.site) {
-        Some(found) if found != *own => {
-            let own = own.clone();
-            Err(NotRun::OtherCampaign { found, own }).in_file(folder)
+    let found = match read_manifest(&folder) {
+        Some(manifest) if manifest.site == *own => return Ok(()),
+        Some(manifest) => manifest.site,
+        None => {
+            let entries = fs::read_dir(&folder).into_iter().flatten().flatten();
+            let mut entries = entries.map(|entry| entry.file_name());
+            let is_foreign = |name: &OsString| !name.to_string_lossy().starts_with('.');
+            return match entries.find(is_foreign) {
+                Some(name) => Err(NotRun::Foreign(name)).in_file(folder),
+                None => Ok(()),
+            };
         }
-        _ => Ok(()),
-    }
+    };
+    let own = own.clone();
+    Err(NotRun::OtherCampaign { found, own }).in_file(folder)
 }
 
 /// Runs the sites on this machine; they are returned in their order.

@@ -109,7 +109,7 @@ pub(super) fn run_sites(campaign: &Campaign, sites: &[usize], out: &Path) -> Res
                 );
             });
             if let Err(failure) = results {
-                Cluster::cancel(&job);
+                cluster.cancel(&job);
                 return Err(failure);
             }
             ended.extend(results?.into_iter().map(|of| (of.site.clone(), of)));
@@ -123,7 +123,9 @@ pub(super) fn run_sites(campaign: &Campaign, sites: &[usize], out: &Path) -> Res
     }
     // Logs of failed tasks remain.
     if ended.values().all(|of| of.failure().is_none()) {
-        let _ = fs::remove_dir_all(&cluster.folder);
+        cluster.clear()?;
+        // A file of somebody else keeps it.
+        let _ = fs::remove_dir(&cluster.folder);
     }
     Ok(ended.into_values().collect())
 }
@@ -164,17 +166,44 @@ impl Cluster<'_> {
     /// Cancels the job of an earlier command that was killed, and empties the folder of tasks.
     fn begin(&self) -> Result<()> {
         if let Ok(job) = fs::read_to_string(self.folder.join(JOB)) {
-            Self::cancel(job.trim());
+            self.cancel(job.trim());
         }
-        if self.folder.exists() {
-            fs::remove_dir_all(&self.folder)
-                .map_err(IoError::on("remove"))
-                .in_file(&self.folder)?;
-        }
+        self.clear()?;
         fs::create_dir_all(&self.folder)
             .map_err(IoError::on("create the folder"))
             .in_file(&self.folder)?;
         Ok(())
+    }
+
+    /// Removes the files of tasks; others remain.
+    fn clear(&self) -> Result<()> {
+        let is_own = |name: &str| {
+            let (numbers, ending) = name.split_once('.').unwrap_or((name, ""));
+            let is_number =
+                |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+            name == JOB
+                || ["json", "result.json", "log"].contains(&ending)
+                    && numbers
+                        .split_once('-')
+                        .is_some_and(|(attempt, task)| is_number(attempt) && is_number(task))
+        };
+        let Ok(entries) = fs::read_dir(&self.folder) else {
+            return Ok(());
+        };
+        for entry in entries.flatten() {
+            if entry.file_name().to_str().is_some_and(is_own) {
+                let path = entry.path();
+                fs::remove_file(&path)
+                    .map_err(IoError::on("remove"))
+                    .in_file(&path)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The name of its jobs.
+    fn job_name(&self) -> String {
+        format!("areograph-{}", self.name)
     }
 
     /// Writes the task files of some sites, `<attempt>-<number>.json`.
@@ -208,7 +237,7 @@ impl Cluster<'_> {
         let mut sbatch = Command::new("sbatch");
         sbatch
             .arg("--parsable")
-            .arg(format!("--job-name=areograph-{}", self.name))
+            .arg(format!("--job-name={}", self.job_name()))
             .arg(format!("--array=0-{}{limit}", tasks.len() - 1))
             .arg(format!("--mem={memory_mb}M"))
             .arg(format!("--time={}", self.minutes))
@@ -318,8 +347,12 @@ impl Cluster<'_> {
 
     /// Cancels a job, and waits until its tasks have left the queue; a cluster that does not answer is left alone, since the
     /// locks of the sites remain.
-    fn cancel(job: &str) {
-        if job.is_empty() || answer_of("scancel", Command::new("scancel").arg(job)).is_err() {
+    fn cancel(&self, job: &str) {
+        // The number of a job alone may be that of somebody else, on another cluster or after a restart.
+        let mut scancel = Command::new("scancel");
+        scancel.arg(format!("--name={}", self.job_name())).arg(job);
+        let is_number = !job.is_empty() && job.bytes().all(|byte| byte.is_ascii_digit());
+        if !is_number || answer_of("scancel", &mut scancel).is_err() {
             return;
         }
         let begun = Instant::now();

@@ -70,6 +70,15 @@ impl SiteEnd {
         matches!(self.end, End::Products { valid: true, .. })
     }
 
+    /// The site and its failure, if it failed.
+    #[must_use]
+    pub fn failed_with(&self) -> Option<(&str, &String)> {
+        match &self.end {
+            End::Failed { text, .. } => Some((&self.site, text)),
+            End::Products { .. } => None,
+        }
+    }
+
     /// Exit code of the failure, if the site failed.
     #[must_use]
     pub const fn failure(&self) -> Option<u8> {

@@ -35,12 +35,15 @@ impl ImageFiles {
 }
 
 /// Files by product, as [`product_named`] writes it. Of several files of one kind, the first in the order of their paths is
-/// taken.
+/// taken, and a sentence states the others.
 ///
 /// # Errors
 /// A folder that cannot be listed.
-pub(super) fn files_by_product(folder: &Path) -> Result<BTreeMap<String, ImageFiles>> {
+pub(super) fn files_by_product(
+    folder: &Path,
+) -> Result<(BTreeMap<String, ImageFiles>, Option<String>)> {
     let mut found: BTreeMap<String, ImageFiles> = BTreeMap::new();
+    let mut repeated = Vec::new();
     let endings = [&LABELS[..], &IMAGES[..]].concat();
     let files = files_in(folder, &endings, DEPTH_MAX)
         .map_err(IoError::on("list"))
@@ -60,11 +63,20 @@ pub(super) fn files_by_product(folder: &Path) -> Result<BTreeMap<String, ImageFi
         } else {
             &mut of_product.image
         };
-        if place.is_none() {
-            *place = Some(path);
+        match place {
+            None => *place = Some(path),
+            Some(_) => repeated.push(path),
         }
     }
-    Ok(found)
+    let remark = repeated.first().map(|first| {
+        format!(
+            "{}: {} files are not used, because an earlier path names the same image; the first is {}",
+            folder.display(),
+            repeated.len(),
+            first.display()
+        )
+    });
+    Ok((found, remark))
 }
 
 #[cfg(test)]
@@ -84,12 +96,17 @@ mod tests {
         ] {
             std::fs::File::create(path(name)).unwrap();
         }
-        let found = files_by_product(folder.path()).unwrap();
-        assert_eq!(found.len(), 2);
+        let (found, remark) = files_by_product(folder.path()).unwrap();
+        assert_eq!((found.len(), remark), (2, None));
         let both = &found["E0202855"];
         assert_eq!(both.label(), Some(&path("E02-02855.LBL")));
         assert_eq!(both.image(), Some(&path("volume/e0202855.imq")));
         assert_eq!(found["M0400001"].label(), Some(&path("m0400001.img")));
+        std::fs::File::create(path("z-m0400001.img")).unwrap();
+        std::fs::File::create(path("volume/m0400001.imq")).unwrap();
+        let (found, remark) = files_by_product(folder.path()).unwrap();
+        assert_eq!(found["M0400001"].label(), Some(&path("m0400001.img")));
+        assert!(remark.unwrap().contains("volume/m0400001.imq"));
         assert!(files_by_product(&path("none")).is_err());
     }
 }

@@ -20,12 +20,17 @@ pub use ended::{End, SiteEnd, SiteTask, run_site_file};
 pub(in crate::flow) use results::is_of_campaign;
 pub use results::{CAMPAIGN, CampaignAnswer, publish_results};
 pub use selection::{Campaign, LeftOut, PlannedSite, select_campaign};
+pub use site_files::SITES;
 
 /// A site of a campaign.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct CampaignSite<'a> {
     /// Its identifier, which is the name of its folder.
     pub id: &'a str,
     /// Its images in the index; those that the index does not have are missing.
     pub images: Vec<&'a IndexedImage>,
+    /// Reason why it has no products of this campaign, whatever its folder contains.
+    pub failure: Option<String>,
+    /// BLAKE3, hexadecimal, of the keys and values of its site file; products of other keys are not used.
+    pub configuration_blake3: Option<String>,
 }

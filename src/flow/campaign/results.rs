@@ -15,7 +15,7 @@ use super::{
 };
 use crate::{
     capabilities::declarations,
-    error::{Error, Result},
+    error::{Cause, Error, Result},
     flow::PUBLISH,
     products::{CAMPAIGN_PAGE, CampaignProducts, PageData, write_campaign_products},
     report::campaign_page,
@@ -106,6 +106,12 @@ pub fn publish_results(
     })
 }
 
+/// The products of a site follow from another site file.
+#[derive(Debug, thiserror::Error, Cause)]
+#[error("the products follow from an earlier campaign file")]
+#[cause(Configuration: "run this site again")]
+struct OtherConfiguration;
+
 /// Rows of all sites, in their order.
 fn rows_of(out: &Path, sites: &[CampaignSite<'_>]) -> CampaignRows {
     let mut rows = CampaignRows::default();
@@ -128,7 +134,7 @@ fn rows_of(out: &Path, sites: &[CampaignSite<'_>]) -> CampaignRows {
 fn rows_of_site(out: &Path, site: &CampaignSite<'_>) -> SiteRows {
     let folder = out.join(site.id);
     let absent = "no run of the site has finished".to_owned();
-    if let Some(failure) = last_failure(&folder) {
+    if let Some(failure) = site.failure.clone().or_else(|| last_failure(&folder)) {
         return without_products(site, SiteState::Failed, in_one_line(out, &failure));
     }
     if !folder.join(MANIFEST).exists() {
@@ -150,6 +156,14 @@ fn rows_of_site(out: &Path, site: &CampaignSite<'_>) -> SiteRows {
 
 fn of_folder(folder: &Path, site: &CampaignSite<'_>) -> std::result::Result<SiteRows, Error> {
     let manifest = read_published_by_stored_hashes(folder)?;
+    let published = &manifest.configuration.blake3;
+    if site
+        .configuration_blake3
+        .as_ref()
+        .is_some_and(|own| own != published)
+    {
+        return Err(OtherConfiguration.into());
+    }
     let data = PageData::read(folder)?;
     let rows = data.with(declarations(), |products| {
         Ok(of_published(site, &manifest, products))

@@ -7,13 +7,11 @@ use std::{
 };
 
 use super::{
-    CampaignSite,
+    CampaignSite, SiteEnd,
     files::{ImageFiles, files_by_product},
 };
 use crate::{
-    config::{
-        CampaignConfig, CampaignImage, SelectionConfig, SiteTemplate, absolute, load_campaign,
-    },
+    config::{CampaignConfig, CampaignImage, SelectionConfig, SiteTemplate, load_campaign, real},
     error::Result,
     geom::window::{Region, WindowShape},
     pds::{
@@ -66,6 +64,8 @@ pub struct LeftOut {
     pub site: String,
     /// The file that is missing, in words.
     pub lack: String,
+    /// Positions of its images in [`Campaign::images`].
+    pub(super) images: Vec<usize>,
 }
 
 /// Reads a campaign file and its indexes, and forms the sites.
@@ -83,21 +83,25 @@ pub fn select_campaign(path: &Path) -> Result<Campaign> {
     if regions.is_empty() {
         regions.push(("everywhere".to_owned(), everywhere()));
     }
-    let (mut images, mut excluded) = (Vec::new(), 0);
+    let (mut images, mut excluded) = (Vec::new(), BTreeSet::new());
     for index in &config.archive.indexes {
         let selection = select_images(
             read_index(index)?,
             |image| wants(&config.select, image),
             &regions,
         );
-        excluded += selection.excluded;
+        excluded.extend(selection.excluded);
         images.extend(selection.found);
         let of_index = selection.remarks.into_iter();
         remarks.extend(of_index.map(|remark| format!("{}: {remark}", index.display())));
     }
     merge(&mut images);
     let files = match &config.archive.folder {
-        Some(folder) => Some(files_by_product(&absolute(folder)?)?),
+        Some(folder) => {
+            let (files, repeated) = files_by_product(&real(folder)?)?;
+            remarks.extend(repeated);
+            Some(files)
+        }
         None => None,
     };
     let mut campaign = Campaign {
@@ -106,7 +110,7 @@ pub fn select_campaign(path: &Path) -> Result<Campaign> {
         config,
         template,
         images,
-        excluded,
+        excluded: excluded.len(),
         remarks,
     };
     let (mut sites, mut left_out) = (Vec::new(), Vec::new());
@@ -158,20 +162,36 @@ fn wants(select: &SelectionConfig, image: &IndexedImage) -> bool {
 }
 
 impl Campaign {
-    /// The sites whose results the campaign pools.
-    #[must_use]
-    pub fn results_of(&self) -> Vec<CampaignSite<'_>> {
-        let sites = self.sites.iter();
-        sites
-            .map(|site| CampaignSite {
+    /// The sites whose results the campaign pools, and those that are left out, as rows with the reason.
+    ///
+    /// * `ended` – sites that have just run
+    ///
+    /// # Errors
+    /// The folder of the site files cannot be found.
+    pub fn results_of(&self, ended: &[SiteEnd], out: &Path) -> Result<Vec<CampaignSite<'_>>> {
+        let failures: BTreeMap<&str, &String> =
+            ended.iter().filter_map(SiteEnd::failed_with).collect();
+        let images = |numbers: &[usize]| -> Vec<&IndexedImage> {
+            let numbers = numbers.iter();
+            numbers.map(|number| &self.images[*number].image).collect()
+        };
+        let mut sites = Vec::with_capacity(self.sites.len() + self.left_out.len());
+        for site in &self.sites {
+            sites.push(CampaignSite {
                 id: &site.id,
-                images: site
-                    .images
-                    .iter()
-                    .map(|number| &self.images[*number].image)
-                    .collect(),
-            })
-            .collect()
+                images: images(&site.images),
+                failure: failures.get(&*site.id).map(|text| (*text).clone()),
+                configuration_blake3: self.template.hash_of_site_file(&self.text_of(site, out)?),
+            });
+        }
+        sites.extend(self.left_out.iter().map(|site| CampaignSite {
+            id: &site.site,
+            images: images(&site.images),
+            failure: Some(format!("left out: {}", site.lack)),
+            configuration_blake3: None,
+        }));
+        sites.sort_by(|a, b| a.id.cmp(b.id));
+        Ok(sites)
     }
 
     /// The images of every site, and its description.
@@ -223,6 +243,7 @@ impl Campaign {
         let lacks = |lack: String| LeftOut {
             site: id.clone(),
             lack,
+            images: images.clone(),
         };
         let mut entries = Vec::with_capacity(found.len());
         for (image, id) in found.iter().zip(ids) {

@@ -8,14 +8,14 @@ use std::{
 
 use super::{Campaign, PlannedSite};
 use crate::{
-    config::{SITE_FILE_MARK, absolute},
+    config::{SITE_FILE_MARK, real},
     error::{IoError, Locate as _, Result},
     files::{Mark, MarkAt, require_own},
     store::atomic,
 };
 
 /// Folder of the site files in the output folder.
-pub(super) const SITES: &str = "sites";
+pub const SITES: &str = "sites";
 
 /// Recognises such a file.
 const SITE_FILE: Mark = Mark {
@@ -29,18 +29,30 @@ impl Campaign {
     /// # Errors
     /// A foreign file in its place; a folder that cannot be written.
     pub fn write_site_file(&self, site: &PlannedSite, out: &Path) -> Result<PathBuf> {
-        let folder = absolute(out)?.join(SITES);
-        let text = self.template.site_file(
+        let folder = out.join(SITES);
+        fs::create_dir_all(&folder)
+            .map_err(IoError::on("create the folder"))
+            .in_file(&folder)?;
+        let text = self.text_of(site, out)?;
+        // As the user names the folder, so that messages do.
+        let path = out.join(SITES).join(format!("{}.toml", site.id));
+        write(&path, &text)?;
+        Ok(path)
+    }
+
+    /// The text of a site file.
+    ///
+    /// # Errors
+    /// The folder of the site files cannot be found.
+    pub(super) fn text_of(&self, site: &PlannedSite, out: &Path) -> Result<String> {
+        let folder = real(&out.join(SITES))?;
+        Ok(self.template.site_file(
             &site.id,
             &site.description,
             &site.entries,
             site.ties.as_deref(),
             &folder,
-        );
-        // As the user names the folder, so that messages do.
-        let path = out.join(SITES).join(format!("{}.toml", site.id));
-        write(&path, &text)?;
-        Ok(path)
+        ))
     }
 
     /// Removes site files that the campaign wrote for sites that it no longer has; products remain. Returns the sites.
@@ -77,11 +89,6 @@ impl Campaign {
 fn write(path: &Path, text: &str) -> Result<()> {
     if fs::read(path).is_ok_and(|found| found == text.as_bytes()) {
         return Ok(());
-    }
-    if let Some(folder) = path.parent() {
-        fs::create_dir_all(folder)
-            .map_err(IoError::on("create the folder"))
-            .in_file(folder)?;
     }
     atomic::replace(path, text.as_bytes(), SITE_FILE)
 }

@@ -16,6 +16,7 @@ use crate::{
             PairState, PolynomialRmse, ProfileRow, RangeStatistics, SiteRow, SiteState,
             shot_spacing_m,
         },
+        select_images::identifier,
     },
     store::manifest::Manifest,
 };
@@ -42,7 +43,7 @@ pub(super) fn without_products(
     let images: Vec<ImageRow> = images
         .map(|indexed| ImageRow {
             site: site.id.to_owned(),
-            image: image_id(indexed),
+            image: identifier(indexed),
             ..of_index(indexed)
         })
         .collect();
@@ -73,11 +74,6 @@ pub(super) fn without_products(
         pairs: Vec::new(),
         profiles: Vec::new(),
     }
-}
-
-/// Identifier of an image of the index in site files.
-fn image_id(indexed: &IndexedImage) -> String {
-    indexed.product_id.replace('/', "-")
 }
 
 /// What the index states of an image.
@@ -217,7 +213,7 @@ impl Outcome<'_> {
         } = products.images[index];
         let known = indexed
             .iter()
-            .find(|indexed| image_id(indexed).eq_ignore_ascii_case(&times.id));
+            .find(|indexed| identifier(indexed).eq_ignore_ascii_case(&times.id));
         let known = known.map_or_else(ImageRow::default, |indexed| of_index(indexed));
         let geometry = ImageGeometry::of(times, orientation);
         let simultaneous = simultaneous(products.profiles, index);

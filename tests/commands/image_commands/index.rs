@@ -404,16 +404,13 @@ fn what_the_index_does_not_say_loses_no_image() {
     );
     warning(
         &whole.replace("MOC-NA", "CTX"),
-        "1 images (the first is M01/00001) are from an unknown camera",
+        "1 image (first: M01/00001) omitted, because the camera is unknown",
     );
     let nowhere = whole
         .replace(",49.70,9.50,", ",,,")
         .replace(",3.0,24.0,380.0", ",,,380.0");
     let nowhere = nowhere.replace(",6.0,1.0,10.0,", ",,,10.0,");
-    warning(
-        &nowhere,
-        "1 images (the first is M01/00001) could not be tested",
-    );
+    warning(&nowhere, "1 image (first: M01/00001) not tested");
 }
 
 #[test]

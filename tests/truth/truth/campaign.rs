@@ -88,6 +88,7 @@ fn the_offset_of_a_phase_is_found_and_the_other_phase_has_none() {
             .map(|(id, images)| CampaignSite {
                 id,
                 images: images.iter().collect(),
+                ..CampaignSite::default()
             })
             .collect();
         let answer = publish_results(&out, "phases", &sites).unwrap();

@@ -1,6 +1,9 @@
 //! Site files of a campaign.
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+};
 
 use toml::Value;
 
@@ -10,7 +13,9 @@ use super::{CampaignConfig, SITE};
 use crate::{
     declare::ValueKind,
     document::{Document as _, Loaded, read},
-    paths::{absolute, seen_from, without_parents},
+    paths::{real, seen_from, without_parents},
+    problems::IS_NOW_CALLED,
+    written::Written,
 };
 
 /// Tables and keys of a campaign that are not those of a site.
@@ -46,6 +51,7 @@ pub struct SiteTemplate {
     margin_km: f64,
     ties: Option<String>,
     folder: PathBuf,
+    has_former_names: bool,
 }
 
 /// A campaign, and what its sites have in common.
@@ -61,12 +67,16 @@ pub fn load_campaign(path: &Path) -> Result<(Loaded<CampaignConfig>, SiteTemplat
         tables.remove(key);
     }
     let campaign = &loaded.config;
-    let file = absolute(path)?;
+    let file = real(path)?;
     let template = SiteTemplate {
         tables,
         margin_km: campaign.archive.margin_km,
         ties: campaign.pairs.ties.clone(),
         folder: file.parent().unwrap_or(&file).to_owned(),
+        has_former_names: loaded
+            .warnings
+            .iter()
+            .any(|text| text.contains(IS_NOW_CALLED)),
     };
     Ok((loaded, template))
 }
@@ -79,6 +89,15 @@ impl SiteTemplate {
         Some(without_parents(
             &self.folder.join(written.replace(SITE, site)),
         ))
+    }
+
+    /// BLAKE3, hexadecimal, of the keys and values of the text of a site file, as [`crate::SiteConfig::blake3`]; `None` for a
+    /// campaign that uses former names of keys.
+    #[must_use]
+    pub fn hash_of_site_file(&self, text: &str) -> Option<String> {
+        let table = text.parse().ok()?;
+        let hash = || Written::of(table, &BTreeSet::new()).blake3;
+        (!self.has_former_names).then(hash)
     }
 
     /// The text of the site file of a site, for the folder `folder` (absolute, without links upwards).
@@ -111,7 +130,8 @@ impl SiteTemplate {
                     .entry("files")
                     .or_insert_with(|| Value::Array(Vec::new()));
                 if let Some(files) = files.as_array_mut() {
-                    files.push(path(ties));
+                    let glob = glob_of(&seen_from(folder, ties));
+                    files.push(Value::from(glob.to_string_lossy().into_owned()));
                 }
             }
         }
@@ -154,28 +174,41 @@ impl SiteTemplate {
                 ValueKind::Text { .. } => key.path == "altimeter",
                 _ => false,
             };
+            let kind = match &key.kind {
+                ValueKind::Glob => PathKind::Glob,
+                ValueKind::List { of, .. } if **of == ValueKind::Glob => PathKind::Glob,
+                ValueKind::Text { .. } => PathKind::WordOrFile,
+                _ => PathKind::Path,
+            };
             if names_a_file {
                 let parts: Vec<&str> = key.path.split('.').collect();
-                self.rebase_at(tables, &parts, folder, key.path == "altimeter");
+                self.rebase_at(tables, &parts, folder, kind);
             }
         }
     }
 
-    fn rebase_at(&self, table: &mut toml::Table, path: &[&str], folder: &Path, may_be_word: bool) {
+    fn rebase_at(&self, table: &mut toml::Table, path: &[&str], folder: &Path, kind: PathKind) {
         let Some((first, rest)) = path.split_first() else {
             return;
         };
         let rebased = |written: &str| {
             let there = without_parents(&self.folder.join(written));
-            (!may_be_word || there.is_file())
-                .then(|| seen_from(folder, &there).to_string_lossy().into_owned())
+            if kind == PathKind::WordOrFile && !there.is_file() {
+                return None;
+            }
+            let seen = if kind == PathKind::Glob && !Path::new(written).is_absolute() {
+                glob_of(&seen_from(folder, &self.folder)).join(written)
+            } else {
+                seen_from(folder, &there)
+            };
+            Some(seen.to_string_lossy().into_owned())
         };
         match table.get_mut(*first) {
-            Some(Value::Table(below)) => self.rebase_at(below, rest, folder, may_be_word),
+            Some(Value::Table(below)) => self.rebase_at(below, rest, folder, kind),
             Some(Value::Array(entries)) => {
                 for entry in entries {
                     match entry {
-                        Value::Table(below) => self.rebase_at(below, rest, folder, may_be_word),
+                        Value::Table(below) => self.rebase_at(below, rest, folder, kind),
                         Value::String(written) if rest.is_empty() => {
                             if let Some(path) = rebased(written) {
                                 *written = path;
@@ -193,6 +226,20 @@ impl SiteTemplate {
             _ => {}
         }
     }
+}
+
+/// Kind of a path of the template.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum PathKind {
+    Path,
+    Glob,
+    /// An identifier, or the path of a file.
+    WordOrFile,
+}
+
+/// A path as a glob that matches it alone.
+fn glob_of(path: &Path) -> PathBuf {
+    glob::Pattern::escape(&path.to_string_lossy()).into()
 }
 
 /// First line of a site file that a campaign wrote; such a file is replaced.

@@ -38,8 +38,8 @@ pub struct Found {
 pub struct Selection {
     /// Images in the order of the index.
     pub found: Vec<Found>,
-    /// Images at Mars of a known camera that are not as requested, or outside all windows.
-    pub excluded: usize,
+    /// Products at Mars of a known camera that are not as requested, or outside all windows.
+    pub excluded: Vec<String>,
     /// Sentences on images that could not be tested, and on assumptions.
     pub remarks: Vec<String>,
 }
@@ -101,11 +101,12 @@ pub fn select_images(
         if cameras_of(&image).next().is_none() {
             of_no_camera.push(image.product_id);
         } else if !wants(&image) {
-            selection.excluded += 1;
+            selection.excluded.push(image.product_id);
         } else if let Some((centre_rad, outline)) = place(&image) {
+            let product_id = image.product_id.clone();
             match meeting(image, centre_rad, outline, regions) {
                 Some(found) => selection.found.push(found),
-                None => selection.excluded += 1,
+                None => selection.excluded.push(product_id),
             }
         } else {
             without_place.push(image.product_id);
@@ -117,15 +118,16 @@ pub fn select_images(
         ));
     }
     for (left_out, what) in [
-        (of_no_camera, "are from an unknown camera and are omitted"),
+        (of_no_camera, "omitted, because the camera is unknown"),
         (
             without_place,
-            "could not be tested: no centre, or neither corners nor size on the ground",
+            "not tested: no centre, or neither corners nor size on the ground",
         ),
     ] {
         if let Some(first) = left_out.first() {
             let count = left_out.len();
-            let remark = format!("{count} images (the first is {first}) {what}");
+            let noun = if count == 1 { "image" } else { "images" };
+            let remark = format!("{count} {noun} (first: {first}) {what}");
             selection.remarks.push(remark);
         }
     }
@@ -135,8 +137,8 @@ pub fn select_images(
 /// Images of several indexes in the order of their products: the index of a volume contains all earlier images, of which
 /// one is kept.
 pub fn merge(found: &mut Vec<Found>) {
-    found.sort_by(|a, b| a.image.product_id.cmp(&b.image.product_id));
-    found.dedup_by(|a, b| a.image.product_id == b.image.product_id);
+    found.sort_by_cached_key(|found| identifier(&found.image));
+    found.dedup_by_key(|found| identifier(&found.image));
 }
 
 /// Centre and outline of an image; `None` without a centre, or without both corners and size.
