@@ -1,9 +1,12 @@
 //! Mean of observations that share errors in groups, or their slope over a given factor, with a standard deviation that
-//! assumes no size of the errors.
+//! requires no a priori standard deviations of the observations.
+//!
+//! Every group enters as one observation, whatever its size: groups of unequal size with equal weights of their
+//! observations have fewer degrees of freedom than groups, and a decision by their number is wrong too often.
 //!
 //! # Source
-//! M-estimate: Huber and Ronchetti 2009, *Robust Statistics*, sections 6.3 and 7.6. Standard deviation from sums over groups: Liang
-//! and Zeger 1986, *Biometrika* 73, 13–22. Quantiles of Student's distribution: Wallace 1959, *Annals of Mathematical
+//! M-estimate: Huber and Ronchetti 2009, *Robust Statistics*, sections 6.3 and 7.6. Standard deviation by the jackknife:
+//! MacKinnon and White 1985, *Journal of Econometrics* 29, 305–325. Quantiles of Student's distribution: Wallace 1959, *Annals of Mathematical
 //! Statistics* 30, 1121–1130.
 
 #[cfg(feature = "schema")]
@@ -18,12 +21,14 @@ use super::{robust::RobustWeight, statistics::Summary};
 pub const ROBUST_GROUPS_MIN: usize = 8;
 /// Groups from which on a value is compared with zero.
 pub const DECIDED_GROUPS_MIN: usize = 4;
-/// A value differs from zero where chance explains it as seldom as three standard deviations of a normal distribution.
+/// A value is reported as different from zero at the significance level of three standard deviations of a normal distribution.
 const SIGMAS: f64 = 3.0;
 /// Maximum number of iterations; ten suffice.
 const ITERATIONS_MAX: usize = 100;
 /// Steps below this number of standard deviations end the iteration.
 const STEP_MIN: f64 = 1e-9;
+/// Largest share of one group in the estimate: of a slope, a single group may have all of it.
+const SHARE_MAX: f64 = 1.0 - 1e-6;
 /// Least robust standard deviation as a share of the largest value: rounding of equal values.
 const SCATTER_SHARE_MIN: f64 = 1e-12;
 
@@ -46,14 +51,15 @@ pub struct RobustMean {
     pub n: u32,
     /// Independent groups of observations.
     pub groups: u32,
-    /// The estimate: from 8 groups on, observations far from the others lose weight (Huber).
+    /// The estimate from one mean or slope of each group: from 8 groups on, groups far from the others lose weight (Huber).
     pub value: f64,
     /// Its standard deviation, from the scatter between the groups; missing for a single group.
     #[serde(default, skip_serializing_if = "areograph_base::stored::is_left_out")]
     #[cfg_attr(feature = "schema", schemars(range(min = 0.0)))]
     pub sigma: Option<f64>,
-    /// Number of standard deviations beyond which the estimate differs from zero: 3 for many groups, more for a few
-    /// (Student's distribution, probability 0.27 %); missing below 4 groups, which decide nothing.
+    /// Number of standard deviations beyond which the estimate is reported as different from zero: 3 for many groups, more for
+    /// a few (Student's distribution, two-sided significance level 0.27 %, one degree of freedom fewer than groups that keep
+    /// their full weight); missing with fewer than 4 groups, for which no decision is reported.
     #[serde(default, skip_serializing_if = "areograph_base::stored::is_left_out")]
     #[cfg_attr(feature = "schema", schemars(range(min = 0.0)))]
     pub limit_sigmas: Option<f64>,
@@ -71,28 +77,32 @@ impl RobustMean {
         if used.is_empty() {
             return None;
         }
-        let mut sums: BTreeMap<usize, f64> = used.iter().map(|of| (of.group, 0.0)).collect();
-        let groups = sums.len();
+        let each = of_groups(&used);
+        let groups = each.len();
         let (value, scatter) = if groups < ROBUST_GROUPS_MIN {
-            (least_squares(&used, |_| 1.0), f64::INFINITY)
+            (least_squares(&each, |_| 1.0), f64::INFINITY)
         } else {
-            huber(&used)
+            huber(&each)
         };
         // Residuals beyond the limit count as the limit, and do not respond to the estimate.
         let limit = RobustWeight::HUBER_LIMIT * scatter;
-        let mut normal = 0.0;
-        for of in &used {
-            let residual = of.value - of.factor * value;
-            if let Some(sum) = sums.get_mut(&of.group) {
-                *sum += of.factor * residual.clamp(-limit, limit);
-            }
-            if residual.abs() <= limit {
-                normal += of.factor.powi(2);
-            }
-        }
-        let squares: f64 = sums.values().map(|sum| sum.powi(2)).sum();
-        let spare = groups as f64 / (groups as f64 - 1.0);
-        let sigma = (groups > 1).then(|| (spare * squares).sqrt() / normal);
+        let residual = |of: &Observation| of.value - of.factor * value;
+        let within = || each.iter().filter(|of| residual(of).abs() <= limit);
+        let normal: f64 = within().map(|of| of.factor.powi(2)).sum();
+        // Groups beyond the limit say nothing about the scatter of the others.
+        let free = (within().count().max(2) - 1) as f64;
+        let squares: f64 = each
+            .iter()
+            .map(|of| {
+                // The estimate follows each group by its share, and the residual is smaller by it.
+                let own = of.factor.powi(2);
+                let is_beyond = residual(of).abs() > limit;
+                let others = if is_beyond { normal } else { normal - own };
+                let share = (own / (others + own)).min(SHARE_MAX);
+                (of.factor * residual(of).clamp(-limit, limit) / (1.0 - share)).powi(2)
+            })
+            .sum();
+        let sigma = (groups > 1).then(|| (squares * free / (free + 1.0)).sqrt() / normal);
         let is_decided = groups >= DECIDED_GROUPS_MIN;
         let count = |count: usize| u32::try_from(count).unwrap_or(u32::MAX);
         Some(Self {
@@ -100,11 +110,11 @@ impl RobustMean {
             groups: count(groups),
             value,
             sigma,
-            limit_sigmas: is_decided.then(|| limit_sigmas(groups as f64 - 1.0)),
+            limit_sigmas: is_decided.then(|| limit_sigmas(free)),
         })
     }
 
-    /// Whether the estimate differs from zero beyond chance; `None` where the groups are too few for a decision.
+    /// Whether the estimate is reported as different from zero; `None` where the groups are too few for a decision.
     #[must_use]
     pub fn differs_from_zero(&self) -> Option<bool> {
         Some(self.value.abs() > self.limit_sigmas? * self.sigma?)
@@ -118,6 +128,27 @@ impl RobustMean {
 fn limit_sigmas(freedom: f64) -> f64 {
     let normal = SIGMAS * (8.0 * freedom + 3.0) / (8.0 * freedom + 1.0);
     (freedom * (normal.powi(2) / freedom).exp_m1()).sqrt()
+}
+
+/// One observation for each group, with the slope of the group and the root mean square of its factors: a group of equal
+/// factors is its mean.
+fn of_groups(used: &[Observation]) -> Vec<Observation> {
+    let mut sums: BTreeMap<usize, [f64; 3]> = BTreeMap::new();
+    for of in used {
+        let [count, above, below] = sums.entry(of.group).or_default();
+        *count += 1.0;
+        *above += of.factor * of.value;
+        *below += of.factor.powi(2);
+    }
+    let of_group = |(group, [count, above, below]): (usize, [f64; 3])| {
+        let factor = (below / count).sqrt();
+        Observation {
+            value: factor * above / below,
+            factor,
+            group,
+        }
+    };
+    sums.into_iter().map(of_group).collect()
 }
 
 fn least_squares(used: &[Observation], weight: impl Fn(&Observation) -> f64) -> f64 {

@@ -113,8 +113,9 @@ fn biases(summary: &CampaignSummary) -> Markup {
     }
     if undecided > 0 {
         sentences.push(format!(
-            "{} with too few independent pairs for a decision.",
-            counted(undecided, "mission phase")
+            "{} {} too few independent groups for a decision.",
+            counted(undecided, "mission phase"),
+            if undecided == 1 { "has" } else { "have" }
         ));
     }
     paragraph(&sentences.join(" "))
@@ -184,7 +185,7 @@ fn key_numbers(summary: &CampaignSummary) -> Markup {
                     &format!("{}, squares averaged", counted(budget.pairs as usize, "pair"))))
             }
             (key("pooled", &counted(summary.pairs as usize, "pair"),
-                &format!("of {}, {} without a common image", whole(summary.pair_rows), counted(summary.groups as usize, "group"))))
+                &format!("of {}, {} without a common image or orbit", whole(summary.pair_rows), counted(summary.groups as usize, "group"))))
         }
     }
 }
@@ -194,7 +195,7 @@ fn decided(mean: &RobustMean) -> &'static str {
     match mean.differs_from_zero() {
         Some(true) => "differs from zero",
         Some(false) => "no difference from zero detected",
-        None => "too few independent pairs for a decision",
+        None => "too few independent groups for a decision",
     }
 }
 
@@ -266,10 +267,11 @@ fn phases(summary: &CampaignSummary) -> Markup {
             ],
         );
     }
-    let words = "* differs from zero beyond chance: as seldom as 3 standard deviations of a normal distribution, by Student's \
-                 distribution for the number of independent groups of pairs; below 4 groups nothing is decided. Along and \
-                 across: misregistration of the footprints, image with the larger emission minus the other image. Attitude \
-                 clock: the offset that the displacements of tie points suggest if all images of the phase share it.";
+    let words = "* The mean is reported as different from zero at a two-sided significance level of 0.27 % (Student's \
+                 distribution). With fewer than four groups, no decision is reported. Along and across: misregistration of the \
+                 footprints, image with the larger emission angle minus the other image; pairs with equal or unknown emission \
+                 angles are left out. Attitude clock: the offset that the displacements of tie points suggest if all images of \
+                 the phase share it.";
     html! {
         @if summary.phases.is_empty() { p { "No pair is pooled." } }
         @else { (table.finish()) p { (words) } }
@@ -277,12 +279,22 @@ fn phases(summary: &CampaignSummary) -> Markup {
 }
 
 fn how(summary: &CampaignSummary) -> Markup {
-    let words = "Only sites that are valid, with or without remarks, are pooled; the tables contain all sites. Two images that \
-                 several sites pair count once. Squares are averaged over the pairs, as in eq. 7 of Shan et al. 2005. Standard \
-                 deviations of means follow from the scatter between groups of pairs that share no image, and include all \
-                 errors that differ from group to group; from 8 groups on, pairs far from the others lose weight (Huber).";
+    let words = "Only sites that are valid, with or without remarks, are pooled; the tables contain all sites. Images, pairs of \
+                 images and profiles that several sites have count once. Squares are averaged over the pairs, as in eq. 7 of \
+                 Shan et al. 2005.";
+    let ranges = "Table 3 includes outliers and profiles that the range check or the laser surface rejects. Of sites with a \
+                  common image, one profile of each orbit is pooled. Profiles of sites that overlap without a common image are \
+                  all pooled, and may have shots in common.";
+    let means = "Pairs with a common image, or with images of one orbit, belong to one group. Each group enters a mean as one \
+                 observation, whatever its number of pairs. Standard deviations of means require no a priori standard \
+                 deviations of the observations: they follow from the scatter between groups, and include all errors that \
+                 differ from group to group. From 8 groups on, groups far from the others lose weight (Huber). A mean is \
+                 reported as different from zero at a two-sided significance level of 0.27 % (Student's distribution). With \
+                 fewer than four groups, no decision is reported.";
     html! {
         p { (words) }
+        p { (ranges) }
+        p { (means) }
         p {
             (whole(summary.image_rows)) " rows of images, " (whole(summary.pair_rows)) " of pairs, "
             (whole(summary.profile_rows)) " of profiles."

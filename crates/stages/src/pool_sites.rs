@@ -1,8 +1,8 @@
 //! Pools the published results of many sites: the tables of Shan et al. 2005 over all of them, and biases of mission phases.
 //!
-//! Rows of sites without usable products, and of invalid sites, are counted but not pooled. A pair of images that several
-//! sites have counts once. Pairs that share an image share its errors: standard deviations of means are from the
-//! scatter between groups of pairs without a common image.
+//! Rows of sites without usable products, and of invalid sites, are counted but not pooled. An image, a pair of images or a
+//! profile that several sites have counts once. Pairs that share an image or an orbit share its errors: standard
+//! deviations of means are from the scatter between groups of pairs without a common image or orbit.
 //!
 //! # Source
 //! Shan et al. 2005, Tables 2 to 5, and eq. 5 to 9 with the squares averaged over the sites.
@@ -10,6 +10,7 @@
 mod measures;
 mod phases;
 mod pooled;
+mod repeated;
 mod rows;
 mod summary;
 

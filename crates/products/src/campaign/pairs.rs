@@ -171,8 +171,8 @@ fn geometry<'a>() -> Vec<Column<&'a PairRow>> {
         column(
             "sense",
             Unit::None,
-            "1 where the second image has the larger emission, otherwise −1: a misregistration, second minus first image, \
-             times this number refers to the image with the larger emission, as in means over pairs",
+            "1 if the second image has the larger emission, −1 if the first has, missing if equal or unknown: a misregistration, \
+             second minus first, times this is that of the image with the larger emission minus that of the other",
             |row: &Row| row.sense(),
         ),
         column(

@@ -28,9 +28,10 @@ const YEAR_DAYS: f64 = 365.25;
 /// An axis: its name in titles, its label, and the value of a pair.
 type Axis<T> = (&'static str, &'static str, fn(&PairRow) -> T);
 
-/// Along-track misregistration, image with the larger emission minus the other, metres.
+/// Along-track misregistration, image with the larger emission minus the other, metres; `None` for equal or unknown
+/// emissions.
 fn along_m(pair: &PairRow, state: Option<&PairState>) -> Option<f64> {
-    Some(pair.sense() * state?.misregistration?.along_m.value)
+    Some(pair.sense()? * state?.misregistration?.along_m.value)
 }
 
 /// Misregistration of the pooled pairs over emission, latitude, date, phase, summing and kernel set.

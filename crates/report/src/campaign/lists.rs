@@ -11,7 +11,7 @@ const LISTED: usize = 10;
 /// Letters of a reason; the table of sites has all of it.
 const REASON_LETTERS: usize = 240;
 
-/// The pairs with the largest misregistration and the profiles with the largest mean of range − distance.
+/// The pairs with the largest misregistration and the profiles with the largest absolute mean of range − distance.
 pub(super) fn worst(rows: &CampaignRows) -> Markup {
     html! { (pairs(&rows.pairs)) (profiles(&rows.profiles)) }
 }
@@ -94,7 +94,7 @@ fn profiles(rows: &[ProfileRow]) -> Markup {
         return paragraph("No profile has enough shots to be judged.");
     }
     let mut table = Table::new(
-        "Profiles with the largest mean of range − distance",
+        "Profiles with the largest absolute mean of range − distance",
         &[
             Column::Text("site"),
             Column::Text("profile"),

@@ -187,3 +187,21 @@ fn a_biased_phase_is_named_on_the_first_screen() {
         lead.contains("No mean along-track misregistration was detected in 23 mission phases.")
     );
 }
+
+#[test]
+fn phases_without_a_decision_are_counted() {
+    for (count, words) in [
+        (
+            1,
+            "1 mission phase has too few independent groups for a decision.",
+        ),
+        (
+            5,
+            "5 mission phases have too few independent groups for a decision.",
+        ),
+    ] {
+        let rows = rows(count);
+        let page = campaign_page(&pool_sites("test", &rows), &rows).unwrap();
+        assert!(page.contains(words), "{words}");
+    }
+}

@@ -1,6 +1,6 @@
 //! Biases of mission phases.
 
-use std::collections::BTreeMap;
+use std::{cmp::Ordering, collections::BTreeMap};
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -13,7 +13,7 @@ use areograph_geom::robust_mean::{Observation, RobustMean};
 pub struct Quantity {
     /// The mean, or the slope.
     pub mean: RobustMean,
-    /// Whether it differs from zero beyond chance; missing where the pairs are too few for a decision.
+    /// Whether it is reported as different from zero; missing where the groups of pairs are too few for a decision.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub differs_from_zero: Option<bool>,
 }
@@ -35,7 +35,8 @@ pub struct PhaseSummary {
     pub phase: String,
     /// Pairs of valid sites, each once.
     pub pairs: u32,
-    /// Misregistration of the footprints along the track, image with the larger emission minus the other, metres.
+    /// Misregistration of the footprints along the track, image with the larger emission minus the other, metres; over pairs
+    /// whose emissions are known and differ.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub along_m: Option<Quantity>,
     /// Misregistration across the track, in the same sense, metres.
@@ -52,7 +53,7 @@ pub struct PhaseSummary {
 
 /// The phases in alphabetical order.
 ///
-/// * `pairs` – with the group of each: pairs of different groups share no image
+/// * `pairs` – with the group of each: pairs of different groups share neither an image nor an orbit
 pub(super) fn phases(pairs: &[(&PairRow, usize)]) -> Vec<PhaseSummary> {
     let mut of_phases: BTreeMap<&str, Vec<(&PairRow, usize)>> = BTreeMap::new();
     for (pair, group) in pairs {
@@ -76,11 +77,11 @@ pub(super) fn phases(pairs: &[(&PairRow, usize)]) -> Vec<PhaseSummary> {
             pairs: u32::try_from(pairs.len()).unwrap_or(u32::MAX),
             along_m: quantity(&|pair| {
                 let of = pair.before.misregistration?;
-                Some((pair.sense() * of.along_m.value, 1.0))
+                Some((pair.sense()? * of.along_m.value, 1.0))
             }),
             across_m: quantity(&|pair| {
                 let of = pair.before.misregistration?;
-                Some((pair.sense() * of.across_m.value, 1.0))
+                Some((pair.sense()? * of.across_m.value, 1.0))
             }),
             attitude_clock_s: quantity(&|pair| {
                 Some((pair.before.ties_along_m?.value, pair.clock_m_s?))
@@ -99,12 +100,15 @@ pub fn phase_or_unknown(phase: &str) -> &str {
 
 impl PairRow {
     /// 1 where the second image has the larger emission, −1 where the first has: misregistrations, second minus first image,
-    /// times this number refer to the image with the larger emission, and all pairs can be compared.
+    /// times this number are those of the image with the larger emission minus those of the other, and all pairs can be
+    /// compared. `None` for equal or unknown emissions.
     #[must_use]
-    pub fn sense(&self) -> f64 {
-        match self.emission_rad {
-            [Some(first), Some(second)] if first > second => -1.0,
-            _ => 1.0,
+    pub fn sense(&self) -> Option<f64> {
+        let [first, second] = self.emission_rad;
+        match second?.partial_cmp(&first?)? {
+            Ordering::Greater => Some(1.0),
+            Ordering::Less => Some(-1.0),
+            Ordering::Equal => None,
         }
     }
 }

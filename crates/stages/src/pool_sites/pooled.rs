@@ -6,16 +6,16 @@ use serde::Serialize;
 use super::rows::{ImageRow, PairRow, PairState, ProfileRow, RangeStatistics};
 use areograph_base::units::{RADIANS_PER_ARCSECOND, RADIANS_PER_DEGREE, SECONDS_PER_MS};
 use areograph_geom::{
+    polynomial,
     robust_mean::{Observation, RobustMean},
     statistics::Summary,
     uncertainty::ResidualMoments,
 };
 
 /// Root mean square; `None` without values.
-pub(super) fn root_mean_square(values: impl IntoIterator<Item = f64>) -> Option<f64> {
-    let squares: Vec<f64> = values.into_iter().map(|value| value.powi(2)).collect();
-    let n = squares.len() as f64;
-    (n > 0.0).then(|| (squares.iter().sum::<f64>() / n).sqrt())
+fn root_mean_square(values: impl IntoIterator<Item = f64>) -> Option<f64> {
+    let values: Vec<f64> = values.into_iter().collect();
+    (!values.is_empty()).then(|| polynomial::root_mean_square(&values))
 }
 
 fn count(count: usize) -> u32 {
@@ -25,7 +25,7 @@ fn count(count: usize) -> u32 {
 /// Images (Table 2 of Shan et al. 2005), over the images for which each value is known.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct ImagesPooled {
-    /// Images of valid sites.
+    /// Images of valid sites, each once.
     pub images: u32,
     /// Emission at the centre, degrees.
     pub emission_deg: Summary,
@@ -68,7 +68,7 @@ impl ImagesPooled {
     }
 }
 
-/// Range minus distance over many profiles (Table 3 of Shan et al. 2005).
+/// Range minus distance over many profiles (Table 3 of Shan et al. 2005), outliers and rejected profiles included.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct RangesPooled {
     /// Profiles with shots.
@@ -113,10 +113,12 @@ impl RangesPooled {
         })
     }
 
+    /// Of all shots of these profiles, which share none.
     pub(super) fn of_all(profiles: &[&ProfileRow]) -> Option<Self> {
         Self::of(&profiles.iter().map(|of| of.ranges).collect::<Vec<_>>())
     }
 
+    /// Of their shots in simultaneous images.
     pub(super) fn of_images(profiles: &[&ProfileRow]) -> Option<Self> {
         Self::of(&profiles.iter().map(|of| of.in_image).collect::<Vec<_>>())
     }
@@ -207,7 +209,7 @@ impl ResidualsPooled {
 /// Misregistration of footprints over many pairs.
 ///
 /// A mean has a sign: the image with the larger emission minus the other one, so that the order of the images of a pair
-/// does not matter.
+/// does not matter. Pairs with equal or unknown emissions have no such sign and are not part of means.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct MisregistrationPooled {
     /// Pairs with footprints in both images.
@@ -236,7 +238,7 @@ pub struct MisregistrationPooled {
 impl MisregistrationPooled {
     /// Of the state of each pair that `of` selects; `None` without footprints.
     ///
-    /// * `pairs` – with the group of each: pairs of different groups share no image
+    /// * `pairs` – with the group of each: pairs of different groups share neither an image nor an orbit
     pub(super) fn of<'a>(
         pairs: &[(&'a PairRow, usize)],
         of: fn(&'a PairRow) -> Option<&'a PairState>,
@@ -247,10 +249,12 @@ impl MisregistrationPooled {
             .collect();
         let mean = |value: &dyn Fn(usize) -> f64| {
             let each = found.iter().enumerate();
-            let each = each.map(|(at, (pair, group, _))| Observation {
-                value: pair.sense() * value(at),
-                factor: 1.0,
-                group: *group,
+            let each = each.filter_map(|(at, (pair, group, _))| {
+                Some(Observation {
+                    value: pair.sense()? * value(at),
+                    factor: 1.0,
+                    group: *group,
+                })
             });
             RobustMean::of(&each.collect::<Vec<_>>())
         };

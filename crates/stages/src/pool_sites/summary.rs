@@ -11,7 +11,7 @@ use super::{
         HeightsPooled, ImagesPooled, MisregistrationPooled, RangesPooled, ResidualsPooled,
         RmsePooled,
     },
-    rows::{CampaignRows, PairRow, PairState, SiteRow, SiteState},
+    rows::{CampaignRows, ImageRow, PairRow, PairState, SiteRow, SiteState},
 };
 use areograph_geom::uncertainty::UncertaintyBudget;
 
@@ -91,7 +91,7 @@ pub struct CampaignSummary {
     pub profile_rows: u32,
     /// Pairs that are pooled: of valid sites, each once.
     pub pairs: u32,
-    /// Groups of these pairs without a common image.
+    /// Groups of these pairs without a common image or orbit.
     pub groups: u32,
     /// Images (Table 2).
     pub images: ImagesPooled,
@@ -146,11 +146,10 @@ impl StatePooled {
 #[must_use]
 pub fn pool_sites(campaign: &str, rows: &CampaignRows) -> CampaignSummary {
     let count = |count: usize| u32::try_from(count).unwrap_or(u32::MAX);
-    let pairs = pooled_pairs(&rows.pairs);
+    let pairs = pooled_pairs(&rows.pairs, &rows.images);
     let groups: BTreeSet<usize> = pairs.iter().map(|(_, group)| *group).collect();
-    let images: Vec<_> = rows.images.iter().filter(|image| image.is_valid).collect();
-    let profiles = rows.profiles.iter();
-    let profiles: Vec<_> = profiles.filter(|profile| profile.is_valid).collect();
+    let images = rows.pooled_images();
+    let profiles = rows.pooled_profiles();
     CampaignSummary {
         format: "areograph campaign 1",
         campaign: campaign.to_owned(),
@@ -187,38 +186,63 @@ fn budgets(pairs: &[(&PairRow, usize)]) -> Option<BudgetsPooled> {
     })
 }
 
-/// The pairs of valid sites, each once, with their groups: pairs of different groups share no image.
-fn pooled_pairs(rows: &[PairRow]) -> Vec<(&PairRow, usize)> {
+/// What pairs may share, and with it errors: images of one orbit have its position and attitude in common.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Shared<'a> {
+    Image(&'a str),
+    /// An orbit of a mission phase.
+    Orbit(&'a str, u32),
+}
+
+/// The pairs of valid sites, each once, with their groups: pairs of different groups share neither an image nor an orbit.
+fn pooled_pairs<'a>(rows: &'a [PairRow], images: &'a [ImageRow]) -> Vec<(&'a PairRow, usize)> {
     let pairs: Vec<&PairRow> = rows
         .iter()
         .filter(|pair| pair.is_valid && !pair.is_repeated)
         .collect();
-    let mut numbers: BTreeMap<&str, usize> = BTreeMap::new();
+    let orbits: BTreeMap<&str, (&str, u32)> = images
+        .iter()
+        .filter_map(|image| Some((&*image.image, (&*image.phase, image.orbit?))))
+        .collect();
+    let shared = |pair: &'a PairRow| {
+        let images = pair.images.iter().map(|image| Shared::Image(image));
+        let of_images = pair.images.iter().filter_map(|image| orbits.get(&**image));
+        images.chain(of_images.map(|of| Shared::Orbit(of.0, of.1)))
+    };
+    let mut numbers: BTreeMap<Shared<'_>, usize> = BTreeMap::new();
     let mut joined: Vec<usize> = Vec::new();
-    for image in pairs.iter().flat_map(|pair| &pair.images) {
-        numbers.entry(image).or_insert_with(|| {
-            joined.push(joined.len());
-            joined.len() - 1
-        });
-    }
-    let ends = |pair: &PairRow| [0, 1].map(|at| numbers[&*pair.images[at]]);
-    for pair in &pairs {
-        let [first, second] = ends(pair).map(|image| root(&mut joined, image));
-        joined[first.max(second)] = first.min(second);
+    let mut first_of_pairs = Vec::new();
+    for pair in pairs.iter().copied() {
+        let mut top: Option<usize> = None;
+        for of in shared(pair) {
+            let number = *numbers.entry(of).or_insert_with(|| {
+                joined.push(joined.len());
+                joined.len() - 1
+            });
+            let own = root(&mut joined, number);
+            let least = top.map_or(own, |top| top.min(own));
+            joined[own] = least;
+            if let Some(top) = top {
+                joined[top] = least;
+            }
+            top = Some(least);
+        }
+        first_of_pairs.push(top.unwrap_or_default());
     }
     pairs
         .into_iter()
-        .map(|pair| (pair, root(&mut joined, ends(pair)[0])))
+        .zip(first_of_pairs)
+        .map(|(pair, first)| (pair, root(&mut joined, first)))
         .collect()
 }
 
-/// The image that represents the group of an image; every image on the way is joined to it directly.
-fn root(joined: &mut [usize], image: usize) -> usize {
-    let mut top = image;
+/// What represents the group of an image or orbit; everything on the way is joined to it directly.
+fn root(joined: &mut [usize], of: usize) -> usize {
+    let mut top = of;
     while joined[top] != top {
         top = joined[top];
     }
-    let mut at = image;
+    let mut at = of;
     while joined[at] != top {
         at = std::mem::replace(&mut joined[at], top);
     }

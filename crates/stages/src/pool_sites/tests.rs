@@ -121,6 +121,113 @@ fn pairs_that_share_images_are_one_group_and_repeated_ones_are_left_out() {
     assert!((rms_m - 11.0_f64.sqrt()).abs() < 1e-12);
 }
 
+/// An image of a valid site, of an orbit of phase E02.
+fn image(site: &str, image: &str, orbit: u32) -> ImageRow {
+    ImageRow {
+        site: site.to_owned(),
+        is_valid: true,
+        image: image.to_owned(),
+        phase: "E02".to_owned(),
+        orbit: Some(orbit),
+        ..ImageRow::default()
+    }
+}
+
+#[test]
+fn pairs_with_images_of_one_orbit_are_one_group() {
+    let pairs = [["a", "b"], ["c", "d"], ["e", "f"], ["g", "h"]];
+    let orbits = [("a", 1), ("b", 2), ("c", 3), ("d", 1), ("e", 4), ("f", 5)];
+    let mut rows = CampaignRows {
+        pairs: pairs.map(|images| pair(images, 1.0)).into(),
+        images: orbits.map(|(of, orbit)| image("site", of, orbit)).into(),
+        ..CampaignRows::default()
+    };
+    assert_eq!(pool_sites("test", &rows).groups, 3);
+    // The same number in another phase is another orbit.
+    rows.images[0].phase = "E03".to_owned();
+    assert_eq!(pool_sites("test", &rows).groups, 4);
+    // A pair that joins two groups.
+    rows.pairs.push(pair(["h", "e"], 1.0));
+    assert_eq!(pool_sites("test", &rows).groups, 3);
+}
+
+#[test]
+fn pairs_of_equal_or_unknown_emissions_have_no_sign() {
+    for emissions in [[Some(0.2), Some(0.2)], [None, Some(0.2)], [Some(0.2), None]] {
+        let signless = PairRow {
+            emission_rad: emissions,
+            ..pair(["c", "d"], 900.0)
+        };
+        let found = pooled(vec![pair(["a", "b"], 10.0), signless]);
+        let along = found.phases[0].along_m.unwrap();
+        assert_eq!((found.pairs, along.mean.n), (2, 1));
+        let misregistration = found.before.misregistration.unwrap();
+        assert_eq!(misregistration.pairs, 2);
+        assert!((misregistration.along_mean_m.unwrap().value - 10.0).abs() < 1e-12);
+    }
+}
+
+fn profile(site: &str, orbit: u32, image: &str, shots: u32) -> ProfileRow {
+    ProfileRow {
+        site: site.to_owned(),
+        verdict: "valid",
+        is_valid: true,
+        phase: "E02".to_owned(),
+        profile: format!("window/{orbit}"),
+        orbit,
+        image: image.to_owned(),
+        off_nadir_rad: 0.0,
+        ranges: RangeStatistics {
+            n: shots,
+            mean_m: 1.0,
+            deviation_m: 0.3,
+        },
+        mean_without_outliers_m: 1.0,
+        outliers: 0,
+        in_image: RangeStatistics::default(),
+        spacecraft_m: [0.0; 3],
+        is_judged: true,
+        invalid_because: String::new(),
+        rejected_because: String::new(),
+        kernels: KernelSetName::default(),
+    }
+}
+
+/// A single image and two pairs that contain it, a site elsewhere, and an invalid site.
+#[test]
+fn images_and_profiles_of_several_sites_count_once() {
+    let images = [
+        ("x", "a"),
+        ("a", "a"),
+        ("a_b", "a"),
+        ("a_b", "b"),
+        ("b_c", "b"),
+        ("b_c", "c"),
+    ];
+    let mut rows = CampaignRows {
+        images: images.map(|(site, of)| image(site, of, 1)).into(),
+        profiles: vec![
+            profile("x", 1, "", 1_000),
+            profile("a", 1, "", 1),
+            // The image of this orbit is in this site.
+            profile("a_b", 1, "b", 10),
+            profile("a_b", 2, "", 100),
+            // The orbit crosses the site again.
+            profile("a_b", 2, "", 200),
+            profile("b_c", 1, "b", 11),
+            profile("b_c", 2, "", 101),
+            profile("elsewhere", 2, "", 300),
+        ],
+        ..CampaignRows::default()
+    };
+    rows.images[0].is_valid = false;
+    rows.profiles[0].is_valid = false;
+    let found = pool_sites("test", &rows);
+    assert_eq!((found.image_rows, found.images.images), (6, 3));
+    let ranges = found.ranges.unwrap();
+    assert_eq!((ranges.profiles, ranges.shots), (4, 610));
+}
+
 #[test]
 fn ranges_of_profiles_are_those_of_all_shots() {
     let shots: [&[f64]; 3] = [&[1.0, 2.0, 4.0], &[10.0], &[-3.0, -5.0]];

@@ -1,0 +1,50 @@
+//! Images and profiles that several sites of a campaign have.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::rows::{CampaignRows, ImageRow, ProfileRow};
+
+impl CampaignRows {
+    /// The images of valid sites, each once.
+    #[must_use]
+    pub fn pooled_images(&self) -> Vec<&ImageRow> {
+        let mut seen: BTreeSet<&str> = BTreeSet::new();
+        let valid = self.images.iter().filter(|image| image.is_valid);
+        valid.filter(|image| seen.insert(&image.image)).collect()
+    }
+
+    /// The profiles of valid sites, each once, in the order of their rows.
+    ///
+    /// Windows of sites with a common image have its outline in common, and with it shots of every orbit that crosses it:
+    /// of such sites, one counts for each orbit, and one whose window has the image of this orbit precedes others. Sites that
+    /// overlap without a common image may still have shots in common, which rows do not show.
+    #[must_use]
+    pub fn pooled_profiles(&self) -> Vec<&ProfileRow> {
+        let mut images: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+        for image in &self.images {
+            images.entry(&image.site).or_default().insert(&image.image);
+        }
+        let has_common = |one: &str, other: &str| {
+            let both = images.get(one).zip(images.get(other));
+            both.is_some_and(|(one, other)| !one.is_disjoint(other))
+        };
+        let mut counted: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+        for is_simultaneous in [true, false] {
+            let rows = self.profiles.iter().enumerate();
+            let rows = rows.filter(|(_, row)| row.is_valid);
+            for (at, row) in rows.filter(|(_, row)| row.image.is_empty() != is_simultaneous) {
+                let of_orbit = counted.entry(row.orbit).or_default();
+                // A site has each of its profiles once.
+                let is_repeated = of_orbit.iter().any(|earlier| {
+                    let site = &self.profiles[*earlier].site;
+                    *site != row.site && has_common(site, &row.site)
+                });
+                if !is_repeated {
+                    of_orbit.push(at);
+                }
+            }
+        }
+        let places: BTreeSet<usize> = counted.into_values().flatten().collect();
+        places.into_iter().map(|at| &self.profiles[at]).collect()
+    }
+}
