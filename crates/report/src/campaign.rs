@@ -206,7 +206,6 @@ fn downloads() -> Markup {
         ("pairs.csv", "Pairs"),
         ("profiles.csv", "Profiles"),
         ("summary.json", "Pooled numbers"),
-        ("../index.html", "All sites"),
     ];
     html! {
         ul.downloads { @for (path, name) in files { li { (link(path, name)) } } }

@@ -1,4 +1,4 @@
-//! One site of a campaign, from its site file to its end; what of it another process needs to know.
+//! One site of a campaign, from its site file to its end, in a form that processes exchange.
 
 use std::{
     path::{Path, PathBuf},
