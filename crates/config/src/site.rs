@@ -176,7 +176,12 @@ fn across_tables(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
         ]})
     });
     something_to_do(site, keys);
-    folders_of_campaigns(site, keys);
+    if ["campaign", "sites"].contains(&&*site.site) {
+        keys.refuse(
+            "site",
+            "another identifier: a campaign has a folder of this name",
+        );
+    }
     altimeter_of_pedr(site, keys);
     other_bodies(site, keys);
     serial_numbers(keys);
@@ -425,16 +430,6 @@ fn images_of_windows(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
             let expected = one_of_images(&images);
             keys.review().refuse(id.span(), "windows.image", expected);
         }
-    }
-}
-
-/// A campaign has folders beside those of its sites.
-fn folders_of_campaigns(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
-    if ["campaign", "sites"].contains(&&*site.site) {
-        keys.refuse(
-            "site",
-            "another identifier: a campaign has a folder of this name",
-        );
     }
 }
 

@@ -4,7 +4,7 @@ use std::{fs, path::Path};
 
 use serde::{Deserialize, Serialize};
 
-use super::{Campaign, site_files::SITES};
+use super::{SITES, selection::Campaign};
 use crate::{
     error::{Locate as _, Result},
     files::{Mark, MarkAt, require_own},

@@ -8,6 +8,7 @@
 mod costs;
 mod ended;
 mod files;
+mod pooled_sites;
 mod results;
 mod selection;
 mod site_files;
@@ -20,7 +21,9 @@ pub use ended::{End, SiteEnd, SiteTask, run_site_file};
 pub(in crate::flow) use results::is_of_campaign;
 pub use results::{CAMPAIGN, CampaignAnswer, publish_results};
 pub use selection::{Campaign, LeftOut, PlannedSite, select_campaign};
-pub use site_files::SITES;
+
+/// Folder of the site files in the output folder.
+pub const SITES: &str = "sites";
 
 /// A site of a campaign.
 #[derive(Debug, Clone, Default)]

@@ -6,16 +6,16 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::{Campaign, PlannedSite};
+use super::{
+    SITES,
+    selection::{Campaign, PlannedSite},
+};
 use crate::{
     config::{SITE_FILE_MARK, real},
     error::{IoError, Locate as _, Result},
     files::{Mark, MarkAt, require_own},
     store::atomic,
 };
-
-/// Folder of the site files in the output folder.
-pub const SITES: &str = "sites";
 
 /// Recognises such a file.
 const SITE_FILE: Mark = Mark {
