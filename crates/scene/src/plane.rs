@@ -58,7 +58,7 @@ struct Truth {
 /// gives the same bytes.
 ///
 /// # Errors
-/// [`SceneError`](super::SceneError) when the folder holds something else; errors of writing.
+/// [`SceneError`] when the folder holds something else; errors of writing.
 pub fn write_plane_scene(directory: &Path, seed: u64) -> Result<String> {
     let draft = Draft::begin(directory, README)?;
     let mut scene = RECIPE.simulate(seed);

@@ -57,7 +57,7 @@ pub struct SiteTemplate {
 /// A campaign, and what its sites have in common.
 ///
 /// # Errors
-/// As [`Document::load`].
+/// As [`load`](crate::Document::load).
 pub fn load_campaign(path: &Path) -> Result<(Loaded<CampaignConfig>, SiteTemplate), Error> {
     let text = read(path)?;
     let loaded = CampaignConfig::parse(&text, path)?;
