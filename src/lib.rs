@@ -16,6 +16,8 @@ pub use areograph_base::{
     kernel_names, kernel_source, line_times, minus, schema, stored, style, terms, ties, time,
     units, utc, verdict, watch,
 };
+#[cfg(feature = "cluster")]
+pub use areograph_cluster as cluster;
 pub use areograph_config as config;
 pub use areograph_fetch as fetch;
 pub use areograph_geom::{self as geom, imaging};

@@ -16,12 +16,14 @@ use super::{
 use crate::{
     config::{CalibrationConfig, CamerasConfig},
     error::{Cause, IoError, Locate as _, Result},
-    flow::Task,
+    flow::{Task, calibration_series, series_answer},
     pds::isd::{ImageSupport, read_isd},
+    report::calibration_series_page,
     stages::calibrate::apply_calibration,
     store::{
         atomic,
         files::file_name,
+        page::PagePath,
         published::{is_site_folder, read_published},
     },
 };
@@ -34,7 +36,7 @@ use crate::{
 ///
 /// Products go to `<out>/<calibration>`, with calibrated support data (ISD) of every line. Angles that tie points cannot determine
 /// are detected and reported. `calibrate apply` puts the calibrated cameras in support data of other images, and `calibration.from`
-/// of a site uses them with label and kernels.
+/// of a site uses them with label and kernels. `calibrate series` compares calibrations of several orbits.
 ///
 /// Example: `areograph scene calibration hrsc --images && areograph calibrate hrsc/calibration.toml --out products`
 #[derive(Debug, Args)]
@@ -60,6 +62,29 @@ pub(super) struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Apply(ApplyArguments),
+    Series(SeriesArguments),
+}
+
+/// Compares calibrations of one camera in several orbits: changes since the calibration in use, drift, and whether the camera
+/// must be calibrated again.
+///
+/// The first folder is the calibration in use; the order of the others does not matter. Changes are stated with standard
+/// deviations that include the errors of the orbits: differences between lines are known far better than common parts.
+/// A significant change of more than 0.3 px requires a new calibration. With `--page`, a page shows all orbits.
+///
+/// Example: `areograph calibrate series out/i864 out/i818 out/i863 --page series.html`
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+struct SeriesArguments {
+    /// Products of calibrations; first the one in use.
+    #[arg(value_name = "OUT/CALIBRATION", required = true, num_args = 2..)]
+    folders: Vec<PathBuf>,
+    /// Print JSON, with all parameters of all orbits.
+    #[arg(long)]
+    json: bool,
+    /// Write a page with tables and plots to this file; its folder must exist, and products are not overwritten.
+    #[arg(long, value_name = "FILE.html")]
+    page: Option<PathBuf>,
 }
 
 /// Puts the calibrated cameras in support data of other images of the same lines.
@@ -103,8 +128,10 @@ enum ApplyError {
 
 /// Runs the calibration and reports the outcome, or applies one.
 pub(super) fn run(arguments: &Arguments) -> ExitCode {
-    if let Some(Command::Apply(arguments)) = &arguments.command {
-        return finish(apply(arguments));
+    match &arguments.command {
+        Some(Command::Apply(arguments)) => return finish(apply(arguments)),
+        Some(Command::Series(arguments)) => return finish(series(arguments)),
+        None => {}
     }
     // Required without a subcommand.
     let file = arguments.calibration.clone().unwrap_or_default();
@@ -123,6 +150,27 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
             count("left_out"),
         )
     })
+}
+
+fn series(arguments: &SeriesArguments) -> Result<()> {
+    let page_path = arguments.page.as_deref().map(PagePath::new).transpose()?;
+    let series = calibration_series(&arguments.folders)?;
+    if let Some(path) = &page_path {
+        path.write(&calibration_series_page(&series)?)?;
+    }
+    if arguments.json {
+        output::json(&series_answer(&series));
+        return Ok(());
+    }
+    output::line(series.headline());
+    series.findings().iter().for_each(output::line);
+    for (what, reason) in &series.not_used {
+        output::line(format_args!("not used: {what}: {reason}"));
+    }
+    if let Some(path) = &arguments.page {
+        output::line(format_args!("page: {}", path.display()));
+    }
+    Ok(())
 }
 
 /// Writes the support data only after all of them have been computed.
@@ -165,6 +213,13 @@ fn apply(arguments: &ApplyArguments) -> Result<()> {
             of.camera,
             of.calibration,
             of.moved_px
+        ));
+    }
+    if let Some(of) = applied.values().next() {
+        output::line(format_args!(
+            "remark: the offset angles of {} contain the mean error of the calibrated orbit; sites with these support data state \
+             this remark",
+            of.calibration
         ));
     }
     Ok(())

@@ -46,6 +46,7 @@ use crate::{
     column::lost_values,
     config::{Document, SiteConfig, check_sites},
     error::{Cause, Error, Locate as _},
+    fetch::remote::read_stand_ins,
 };
 
 /// Mars Global Surveyor data preparation: SPICE kernels, MOLA shots and MOC images to validated products.
@@ -140,6 +141,7 @@ pub fn main() -> ExitCode {
 pub fn main_of(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> ExitCode {
     let cli = Cli::parse_from(arguments);
     log(&cli);
+    read_stand_ins();
     let code = catch_unwind(AssertUnwindSafe(|| run(cli.command)));
     let code = code.unwrap_or_else(|panic| match lost_values(&*panic) {
         Some(lost) => report(&lost),

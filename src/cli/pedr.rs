@@ -1,5 +1,7 @@
 //! `areograph pedr`.
 
+#[cfg(feature = "cluster")]
+mod cluster;
 mod crossovers;
 mod filter;
 mod index;
@@ -36,6 +38,8 @@ enum Command {
     Match(matching::Arguments),
     #[cfg(feature = "sql")]
     Sql(sql::Arguments),
+    #[cfg(feature = "cluster")]
+    Cluster(cluster::Arguments),
 }
 
 pub(super) fn run(arguments: &Arguments) -> ExitCode {
@@ -49,6 +53,8 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
         Command::Match(arguments) => return matching::run(arguments),
         #[cfg(feature = "sql")]
         Command::Sql(arguments) => sql::run(arguments),
+        #[cfg(feature = "cluster")]
+        Command::Cluster(arguments) => cluster::run(arguments),
     };
     finish(ran)
 }

@@ -8,10 +8,10 @@ use super::{output, progress::Progress};
 use crate::{
     error::Error,
     scene::{
-        ArchiveOptions, CampaignOptions, Coder, Roughness, SceneErrors, SceneOptions,
-        write_archive, write_calibration_loop_scene, write_calibration_scene, write_campaign,
-        write_plane_scene, write_scene, write_scene_along, write_scene_with_images,
-        write_terrain_model_scene,
+        ArchiveOptions, CampaignOptions, Coder, OrbitsScene, Roughness, SceneErrors, SceneOptions,
+        write_archive, write_calibration_loop_scene, write_calibration_orbits,
+        write_calibration_scene, write_campaign, write_plane_scene, write_scene, write_scene_along,
+        write_scene_with_images, write_terrain_model_scene,
     },
     units::SECONDS_PER_DAY,
     watch::Watch,
@@ -57,6 +57,7 @@ struct Target {
 /// Example: `areograph scene mission demo && areograph run demo/sites/*.toml --out products`
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
+#[allow(clippy::struct_excessive_bools, reason = "flags of the command line")]
 struct MissionArguments {
     #[command(flatten)]
     target: Target,
@@ -95,6 +96,9 @@ struct MissionArguments {
     /// Further laser passes over each site of narrow-angle images, on days without an image, 0 to 1000.
     #[arg(long, value_name = "COUNT", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=1000))]
     passes: u32,
+    /// Also write tie points at laser shots, up to 320 a site, as matching by areograph measures them
+    #[arg(long)]
+    ties_at_shots: bool,
     /// Also render the narrow-angle images, `images/*.imq`, which takes minutes.
     #[arg(long)]
     images: bool,
@@ -159,6 +163,14 @@ struct CalibrationArguments {
     /// Three lines of one orbit, with their pixels, `images/*.tif`, and laser passes instead of tables of points.
     #[arg(long)]
     images: bool,
+    /// This number of orbits, 2 to 50, a quarter of a year apart, with a calibration file each: input of `areograph calibrate series`.
+    /// Orbits have errors of 1000 m and 0.025 degrees, profiles of the laser have shared errors.
+    #[arg(long, value_name = "COUNT", conflicts_with = "images", value_parser = clap::value_parser!(u32).range(2..=50))]
+    orbits: Option<u32>,
+    /// Ageing of the camera over the orbits: roll of the second line relative to the first, pixels per year, -100 to 100; scale
+    /// and yaw change by half of this.
+    #[arg(long, value_name = "PX_PER_YEAR", requires = "orbits", default_value_t = 0.5, allow_negative_numbers = true, value_parser = ageing)]
+    ageing_px: f64,
 }
 
 /// Writes a terrain model and laser passes over it for `areograph pedr match`.
@@ -220,6 +232,14 @@ impl Code {
     }
 }
 
+/// Ageing as typed.
+fn ageing(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(px_per_year) if px_per_year.abs() <= 100.0 => Ok(px_per_year),
+        _ => Err("expected a number from -100 to 100".to_owned()),
+    }
+}
+
 /// An offset as typed.
 fn clock_offset(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
@@ -260,15 +280,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
             output::line(write_plane_scene(&target.directory, target.seed)?);
             Ok(())
         }
-        Command::Calibration(CalibrationArguments { target, images }) => {
-            let (directory, seed) = (&target.directory, target.seed);
-            output::line(if *images {
-                working(|watch| write_calibration_loop_scene(directory, seed, watch))?
-            } else {
-                write_calibration_scene(directory, seed)?
-            });
-            Ok(())
-        }
+        Command::Calibration(arguments) => calibration(arguments),
         Command::TerrainModel(TerrainModelArguments { target }) => {
             output::line(working(|_| {
                 write_terrain_model_scene(&target.directory, target.seed)
@@ -279,12 +291,32 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     }
 }
 
+fn calibration(arguments: &CalibrationArguments) -> Result<(), Error> {
+    let Target { directory, seed } = &arguments.target;
+    output::line(match arguments.orbits {
+        Some(orbits) => {
+            let scene = OrbitsScene {
+                seed: *seed,
+                orbits,
+                ageing_px_per_year: arguments.ageing_px,
+            };
+            working(|_| write_calibration_orbits(directory, &scene))?
+        }
+        None if arguments.images => {
+            working(|watch| write_calibration_loop_scene(directory, *seed, watch))?
+        }
+        None => write_calibration_scene(directory, *seed)?,
+    });
+    Ok(())
+}
+
 fn mission(arguments: &MissionArguments) -> Result<(), Error> {
     let Target { directory, seed } = &arguments.target;
     let options = SceneOptions {
         seed: *seed,
         day_s: arguments.day_s,
         passes: arguments.passes,
+        ties_at_shots: arguments.ties_at_shots,
         errors: arguments.errors(),
     };
     let coder = arguments.coder.coder();

@@ -69,7 +69,7 @@ pub(super) const NAME: &str = "archive";
 /// The only stage.
 pub(super) const STAGE: &str = check_archive::NAME;
 /// Raised when the layout of the products changes.
-const LAYOUT: u32 = 7;
+const LAYOUT: u32 = 8;
 /// Profiles whose shots are written.
 const WORST: usize = 12;
 /// Step of the scan of clock biases, seconds: the parabola through the variances interpolates between steps.

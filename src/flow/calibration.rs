@@ -18,7 +18,7 @@ use crate::{
 };
 
 /// Raised when the layout of the products of a calibration changes.
-const METHOD: u32 = 14;
+const METHOD: u32 = 16;
 
 /// Calibrates the lines of a camera and publishes the products.
 pub(super) fn calibration<D: Driver>(flow: &mut D, config: &CalibrationConfig) -> Flow<()> {
@@ -46,10 +46,11 @@ pub(super) fn calibration<D: Driver>(flow: &mut D, config: &CalibrationConfig) -
         has_further_stages,
         write: |staging: &_, result: &_| {
             let model = match &model {
-                Some((surface, [first, last])) => Some(CalibrationModel {
-                    surface: &surface.value()?.model,
-                    first: &first.value()?.found,
-                    last: &last.value()?.found,
+                Some(of) => Some(CalibrationModel {
+                    surface: &of.surface.value()?.model,
+                    first: &of.control[0].value()?.found,
+                    last: &of.control[1].value()?.found,
+                    ties: &of.ties.value()?.points,
                 }),
                 None => None,
             };

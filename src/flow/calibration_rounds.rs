@@ -42,9 +42,18 @@ use crate::{
 pub(super) struct Concluded {
     /// The calibration of the last round.
     pub(super) calibration: Output<Calibration>,
-    /// Its terrain model, and the matches of the laser with the models of the first and of the last round; `None` where
-    /// further rounds may follow that are not known before outputs are.
-    pub(super) model: Option<(Output<Surface>, [Output<ModelMatch>; 2])>,
+    /// Its measurements; `None` where further rounds may follow that are not known before outputs are.
+    pub(super) model: Option<LastRound>,
+}
+
+/// The measurements of the last round.
+pub(super) struct LastRound {
+    /// The terrain model.
+    pub(super) surface: Output<Surface>,
+    /// The matches of the laser with the models of the first and of the last round.
+    pub(super) control: [Output<ModelMatch>; 2],
+    /// The tie points.
+    pub(super) ties: Output<TiesOfLines>,
 }
 
 /// The result of the last round.
@@ -69,7 +78,11 @@ pub(super) fn rounds<D: Driver>(flow: &mut D, config: &CalibrationConfig) -> Flo
         if is_last {
             return Ok(Concluded {
                 calibration: round.concluded(rounds)?,
-                model: Some((round.surface, [first.clone(), round.control])),
+                model: Some(LastRound {
+                    control: [first.clone(), round.control],
+                    surface: round.surface,
+                    ties: round.ties,
+                }),
             });
         }
         before = round.calibrated;

@@ -23,7 +23,7 @@ use crate::{
 };
 
 /// Raised when the layout of the products of a match changes.
-const METHOD: u32 = 10;
+const METHOD: u32 = 12;
 /// Stands for the name of a site in messages and in the manifest.
 pub(super) const NAME: &str = "pedr_match";
 

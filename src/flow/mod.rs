@@ -36,6 +36,7 @@ mod readings;
 mod registered;
 mod result;
 mod run;
+mod series;
 mod shot_search;
 mod shot_tables;
 mod site;
@@ -65,6 +66,7 @@ pub use page::{PageAgain, page_again};
 pub use plan::{RunPlan, plan_site, plan_task};
 pub use readings::{compare_readings, readings_answer, readings_decision, usual_sigmas};
 pub use run::{Ending, RunOptions, RunOutcome, run_site, run_task};
+pub use series::{calibration_series, series_answer};
 pub use shot_search::{COMPLAINTS_MAX, ShotAnswer, ShotRequest, ShotSearch, ShotSink};
 pub use shot_tables::{
     instant_of_table, leap_second_clock, refuse_tables, state_nadir_by_range, tables_among,

@@ -23,7 +23,7 @@ use crate::{
 };
 
 /// Raised when the layout of the products of a net changes.
-const METHOD: u32 = 11;
+const METHOD: u32 = 12;
 
 /// Triangulates a net and publishes its products.
 pub(super) fn net<D: Driver>(flow: &mut D, config: &NetConfig) -> Flow<()> {

@@ -80,6 +80,7 @@ mod tests {
         flow::{LOAD_KERNELS, STAGES, Task, site::site},
         geom::window::WindowShape,
         kernel_source::KernelSource,
+        stages::{interpolate_shots::InterpolateShots, rectify_images::RectifyImages},
     };
 
     #[test]
@@ -125,6 +126,21 @@ mod tests {
         let mut outline = Outline::default();
         site(&mut outline, &config).unwrap();
         let mut first = outline.names();
+        // Without a terrain model, orthoimages are on the ground between shots.
+        config.surface.cell_m = None;
+        let mut without = Outline::default();
+        site(&mut without, &config).unwrap();
+        let without = without.names();
+        let at = without
+            .iter()
+            .position(|name| *name == InterpolateShots::NAME)
+            .unwrap();
+        assert_eq!(without[at + 1], RectifyImages::NAME);
+        let rectified = first
+            .iter()
+            .position(|name| *name == RectifyImages::NAME)
+            .unwrap();
+        first.insert(rectified, without[at]);
         let listed: Vec<&str> = STAGES.to_vec();
         let (load, stages) = listed.split_first().unwrap();
         assert_eq!(*load, LOAD_KERNELS);

@@ -30,7 +30,7 @@ use crate::{
 };
 
 /// Raised when the layout of products changes.
-const METHOD: u32 = 44;
+const METHOD: u32 = 46;
 
 /// The products of a site.
 pub(super) struct SitePublication<'a> {

@@ -9,31 +9,65 @@ use crate::stages::site_image::SiteImages;
 use crate::{
     config::SiteConfig,
     error::Result,
+    files::HashedFile,
     stage::{InOrder, Output, Round, Stage as _},
     stages::{
         adjust::Adjusted,
         compare_orthoimages::{CompareOrthoimages, OrthoimageOffsets},
         image_pixels::PixelFiles,
+        interpolate_shots::{InterpolateShots, ShotModel},
         join_surfaces::JoinSurfaces,
         map_surface::{AdjustmentOfImages, MapSurface, Surface},
         mosaic_images::{Mosaic, MosaicImages},
-        rectify_images::{Orthoimage, RectifyImages},
+        rectify_images::{GroundModel, Orthoimage, RectifyImages},
     },
     store::book::Book,
 };
 
-/// The terrain model of all pairs of images with their best orientation, and orthoimages; not for a site that requests none, or whose
-/// adjustment failed.
+/// The terrain model of all pairs of images with their best orientation, and orthoimages on it, or on the ground between shots if the
+/// site requests no terrain model; not for a site that requests none of them, or whose adjustment failed.
 pub(super) fn surface<D: Driver>(flow: &mut D, config: &SiteConfig, site: &mut Site) -> Flow<()> {
-    let Some(cell_m) = &config.surface.cell_m else {
-        return Ok(());
-    };
-    if site.adjustment_failure.is_some() {
+    let wish = &config.surface;
+    if wish.cell_m.is_none() && wish.orthoimage_cell_m.is_none()
+        || site.adjustment_failure.is_some()
+    {
         return Ok(());
     }
+    if let Some(cell_m) = &wish.cell_m {
+        let pixels = pixel_files(flow, MapSurface::NAME, config)?;
+        let surface = terrain(flow, config, site, (&pixels, cell_m))?;
+        orthoimages(
+            flow,
+            config,
+            site,
+            (&pixels, GroundModel::Terrain(&surface)),
+        )?;
+        let shown = Surface::without_model;
+        return Ok(site.book.enter_heavy(Round::Initial, surface, shown)?);
+    }
+    let pixels = pixel_files(flow, RectifyImages::NAME, config)?;
+    let (converted, profiles) = site.shots()?;
+    let model = flow.stage(&InterpolateShots {
+        images: SiteImages(&site.best_images()?),
+        pixels: PixelFiles(&pixels),
+        converted,
+        profiles,
+        laser_surface: &config.laser_surface,
+    })?;
+    orthoimages(flow, config, site, (&pixels, GroundModel::Shots(&model)))?;
+    let shown = ShotModel::without_cells;
+    Ok(site.book.enter_heavy(Round::Initial, model, shown)?)
+}
+
+/// The terrain model with cells of this edge.
+fn terrain<D: Driver>(
+    flow: &mut D,
+    config: &SiteConfig,
+    site: &Site,
+    (pixels, cell_m): (&[Option<HashedFile>], &f64),
+) -> Flow<Output<Surface>> {
     let adjusted = site.book.output::<Adjusted>(Round::Initial)?;
     let limits = &config.limits;
-    let pixels = pixel_files(flow, MapSurface::NAME, config)?;
     let images = site.best_images()?;
     let images = SiteImages(&images);
     let (converted, profiles) = site.shots()?;
@@ -42,7 +76,7 @@ pub(super) fn surface<D: Driver>(flow: &mut D, config: &SiteConfig, site: &mut S
     let surface_of = |pair: &Option<[String; 2]>| {
         flow.stage(&MapSurface {
             images,
-            pixels: PixelFiles(&pixels),
+            pixels: PixelFiles(pixels),
             converted,
             profiles,
             cell_m,
@@ -54,8 +88,8 @@ pub(super) fn surface<D: Driver>(flow: &mut D, config: &SiteConfig, site: &mut S
         })
     };
     let mut surfaces = pairs.iter().map(surface_of).collect::<Flow<Vec<_>>>()?;
-    let surface = match surfaces.pop() {
-        Some(surface) if surfaces.is_empty() => surface,
+    match surfaces.pop() {
+        Some(surface) if surfaces.is_empty() => Ok(surface),
         last => {
             surfaces.extend(last);
             flow.stage(&JoinSurfaces {
@@ -63,38 +97,51 @@ pub(super) fn surface<D: Driver>(flow: &mut D, config: &SiteConfig, site: &mut S
                 converted,
                 profiles,
                 laser_surface: &config.laser_surface,
-            })?
+            })
         }
+    }
+}
+
+/// Orthoimages on these heights, where the site requests them, and their mosaic.
+fn orthoimages<D: Driver>(
+    flow: &mut D,
+    config: &SiteConfig,
+    site: &mut Site,
+    (pixels, surface): (&[Option<HashedFile>], GroundModel<'_>),
+) -> Flow<()> {
+    let Some(cell_m) = &config.surface.orthoimage_cell_m else {
+        return Ok(());
     };
+    let adjusted = site.book.output::<Adjusted>(Round::Initial)?;
     let before = adjusted.is_some() && config.surface.orthoimages_before;
     let before = before.then(|| site.images()).transpose()?;
     let before = before.as_ref().map(|of| (Round::Initial, SiteImages(of)));
+    let images = site.best_images()?;
     let best = adjusted.map_or(Round::Initial, |_| Round::Adjusted);
+    let rounds = before.into_iter().chain([(best, SiteImages(&images))]);
     let mut made = Vec::new();
-    if let Some(cell_m) = &config.surface.orthoimage_cell_m {
-        for (round, images) in before.into_iter().chain([(best, images)]) {
-            let orthoimages = flow.stage(&RectifyImages {
-                images,
-                pixels: PixelFiles(&pixels),
-                surface: &surface,
-                adjusted: AdjustmentOfImages(adjusted),
-                round,
-                cell_m,
-            })?;
-            made.push(of_orthoimages(
-                flow,
-                config,
-                (round, images),
-                &surface,
-                orthoimages,
-            )?);
-        }
+    for (round, images) in rounds {
+        let orthoimages = flow.stage(&RectifyImages {
+            images,
+            pixels: PixelFiles(pixels),
+            surface,
+            adjusted: AdjustmentOfImages(adjusted),
+            priors: &config.adjustment,
+            round,
+            cell_m,
+        })?;
+        made.push(of_orthoimages(
+            flow,
+            config,
+            (round, images),
+            surface,
+            orthoimages,
+        )?);
     }
     for of in made {
         of.enter(&mut site.book)?;
     }
-    let shown = Surface::without_model;
-    Ok(site.book.enter_heavy(Round::Initial, surface, shown)?)
+    Ok(())
 }
 
 /// The named pair, or all pairs of more than two images with pixels; of fewer images, the stage finds the pair.
@@ -127,7 +174,7 @@ fn of_orthoimages<D: Driver>(
     flow: &mut D,
     config: &SiteConfig,
     (round, images): (Round, SiteImages<'_>),
-    surface: &Output<Surface>,
+    surface: GroundModel<'_>,
     orthoimages: Output<Vec<Orthoimage>>,
 ) -> Flow<Made> {
     let offsets = flow.stage(&CompareOrthoimages {

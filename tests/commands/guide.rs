@@ -27,7 +27,8 @@ const WORDS: [(&str, usize); 3] = [
 ];
 
 /// Starts of commands that other tests run, with what runs them.
-const ELSEWHERE: [(&str, &str); 17] = [
+const ELSEWHERE: [(&str, &str); 21] = [
+    ("gdalwarp -tps image.tif ", "tests/real/real_map.rs"),
     ("scripts/", "continuous integration"),
     (
         "areograph scene mission mission ",
@@ -48,6 +49,9 @@ const ELSEWHERE: [(&str, &str); 17] = [
         "tests/service/service_run.rs, after the sites have run",
     ),
     ("areograph pedr sql", "tests/sql, with its feature"),
+    ("areograph pedr cluster", "tests/cluster, with its feature"),
+    ("areograph pedr index https:", "remote, with a server"),
+    ("areograph pedr search mola ", "remote"),
     (
         "areograph scene calibration pixels",
         "tests/stages/calibration_loop.rs",

@@ -10,6 +10,7 @@
 
 use crate::common;
 
+mod control;
 mod index;
 mod kernels;
 mod readers;

@@ -34,6 +34,7 @@ mod pds_records;
 mod pedr_qa;
 mod pedr_search;
 mod pedr_table;
+mod remote;
 mod report_diff;
 mod report_diff_refused;
 mod rerun;

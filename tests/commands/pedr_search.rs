@@ -454,7 +454,7 @@ fn geojson_has_what_shots_are_chosen_by() {
         let with = features.iter().filter(|of| of["properties"][key] == value);
         with.count()
     };
-    let (ground, other) = (count("class", 1), count("class", 0));
+    let (ground, other) = (count("return_class", 1), count("return_class", 0));
     assert!(ground > 0 && other > 0 && ground + other == features.len());
     let channels: usize = (1..=4).map(|channel| count("channel", channel)).sum();
     let flags: usize = (0..=1).map(|flag| count("attitude_flag", flag)).sum();

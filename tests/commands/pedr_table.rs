@@ -138,6 +138,7 @@ fn file(change: impl Fn(&mut Vec<Record>)) -> File {
         seed: 3,
         day_s: 600.0,
         passes: 0,
+        ties_at_shots: false,
         errors: SceneErrors::demo(),
     };
     write_scene(&scene, &options).unwrap();

@@ -37,6 +37,7 @@ static MISSION: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
         seed: 5,
         day_s: 1_800.0,
         passes: 0,
+        ties_at_shots: false,
         errors: SceneErrors::demo(),
     };
     write_scene(&folder.path().join("mission"), &options).unwrap();

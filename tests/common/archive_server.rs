@@ -46,6 +46,10 @@ pub(crate) enum Fault {
     Hangs,
     /// A web page in place of the file.
     Page,
+    /// This text in place of the file or the listing.
+    Text(String),
+    /// As `NoLength`, and the connection is closed after so many bytes.
+    NoEnd(usize),
     /// Neither length nor chunks: the end of the connection ends the file.
     NoLength,
     /// The file in small pieces with pauses.
@@ -62,11 +66,18 @@ pub(crate) struct Request {
 impl Request {
     /// First byte that it asks for.
     pub(crate) fn from(&self) -> u64 {
-        let range = self.headers.get("range");
-        range.map_or(0, |range| {
-            let first = range.trim_start_matches("bytes=").trim_end_matches('-');
-            first.parse().unwrap()
-        })
+        self.range().map_or(0, |(first, _)| first)
+    }
+
+    /// First and last byte that it asks for; without a last byte, up to the end.
+    pub(crate) fn range(&self) -> Option<(u64, Option<u64>)> {
+        let range = self.headers.get("range")?;
+        let (first, last) = range
+            .strip_prefix("bytes=")
+            .unwrap()
+            .split_once('-')
+            .unwrap();
+        Some((first.parse().unwrap(), last.parse().ok()))
     }
 }
 
@@ -260,6 +271,8 @@ fn answer(
     let path = served.root.join(request.path.trim_start_matches('/'));
     let content = if fault == Some(&Fault::Page) {
         b"<!DOCTYPE html><html><title>Please sign in</title></html>".to_vec()
+    } else if let Some(Fault::Text(text)) = fault {
+        text.clone().into_bytes()
     } else if path.is_dir() {
         listing(&path, served.listing).into_bytes()
     } else if let Ok(content) = fs::read(&path) {
@@ -278,15 +291,16 @@ fn answer(
         .headers
         .get("if-range")
         .is_none_or(|known| *known == etag);
-    let mut from = usize::try_from(request.from()).unwrap();
-    if !is_same || fault == Some(&Fault::IgnoresRange) {
-        from = 0;
-    }
-    if from > content.len() {
+    let range = request.range();
+    let range = range.filter(|_| is_same && fault != Some(&Fault::IgnoresRange));
+    let from = range.map_or(0, |(first, _)| usize::try_from(first).unwrap());
+    if from > 0 && from >= content.len() {
         stream.write_all(plain(416, "").as_bytes())?;
         return Ok(false);
     }
-    let mut body = content[from..].to_vec();
+    let last = range.and_then(|(_, last)| usize::try_from(last?).ok());
+    let end = last.map_or(content.len(), |last| content.len().min(last + 1));
+    let mut body = content[from..end].to_vec();
     let mut announced = body.len();
     match fault {
         Some(Fault::WrongBytes) => body.iter_mut().for_each(|byte| *byte ^= 0x55),
@@ -303,17 +317,17 @@ fn answer(
     } else {
         from
     };
-    let mut head = if from > 0 {
+    let mut head = if range.is_some() {
         format!(
             "HTTP/1.1 206 Partial\r\ncontent-range: bytes {stated}-{}/{}\r\n",
-            content.len() - 1,
+            end - 1,
             content.len()
         )
     } else {
         "HTTP/1.1 200 OK\r\n".to_owned()
     };
     head += "last-modified: Thu, 26 Feb 2009 17:19:00 GMT\r\n";
-    if fault == Some(&Fault::NoLength) {
+    if matches!(fault, Some(Fault::NoLength | Fault::NoEnd(_))) {
         write!(stream, "{head}etag: {etag}\r\nconnection: close\r\n\r\n")?;
     } else {
         write!(
@@ -347,6 +361,10 @@ fn send_body(
             send(&body[..body.len().min(*count)])?;
             // The bytes must be out before the connection breaks.
             thread::sleep(Duration::from_millis(30));
+            return Ok(false);
+        }
+        Some(Fault::NoEnd(count)) => {
+            send(&body[..body.len().min(*count)])?;
             return Ok(false);
         }
         Some(Fault::ShortBy(count)) => {
@@ -434,10 +452,10 @@ fn listing(folder: &Path, form: Listing) -> String {
         .unwrap()
         .map(|entry| {
             let entry = entry.unwrap();
-            (
-                entry.file_name().into_string().unwrap(),
-                entry.metadata().unwrap().len(),
-            )
+            let metadata = entry.metadata().unwrap();
+            let slash = if metadata.is_dir() { "/" } else { "" };
+            let name = entry.file_name().into_string().unwrap();
+            (format!("{name}{slash}"), metadata.len())
         })
         .collect();
     names.sort();

@@ -44,6 +44,25 @@ pub(crate) fn write_pair(folder: &Path) {
     write(folder, 1, &IMAGES[..2], "images = [\"s1\", \"nd\"]\n");
 }
 
+/// Writes `pair.toml` and its files: two images without tie points, and their orthoimages on the ground between shots.
+pub(crate) fn write_pair_on_shots(folder: &Path) {
+    write_pair(folder);
+    let path = folder.join("pair.toml");
+    let mut site = fs::read_to_string(&path).unwrap();
+    for (was, is) in [
+        ("[ties]\nmatch = true\n", ""),
+        ("cell_m = 200.0\n", ""),
+        ("orthoimages_before = true\n", ""),
+        ("images = [\"s1\", \"nd\"]\n", ""),
+        // Brightness as in the images.
+        ("mosaic = true\n", "mosaic = true\nmosaic_balance = false\n"),
+    ] {
+        assert!(site.contains(was), "{was}");
+        site = site.replace(was, is);
+    }
+    fs::write(path, site).unwrap();
+}
+
 /// Writes `pair.toml` and its files: three images, and the terrain model of all pairs with filled holes.
 pub(crate) fn write_three_images(folder: &Path, seed: u64) {
     write(folder, seed, &IMAGES, "filled = true\n");

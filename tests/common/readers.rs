@@ -5,6 +5,8 @@ use std::{
     process::Command,
 };
 
+use serde_json::Value;
+
 use crate::common::outside;
 
 /// Where `scripts/readers` put the Python packages, and whether every reader must be there: `scripts/test`
@@ -65,6 +67,13 @@ pub(crate) fn system_python(script: &str, module: &str, test: &str) -> Option<Co
     let path = format!("{}/tests/exchange/{script}", env!("CARGO_MANIFEST_DIR"));
     command.arg("-B").arg(path);
     Some(command)
+}
+
+/// Every raster below a folder, by path: rows, columns, cells with a value, and whether it is on a projected map; each as rio-cogeo validates
+/// it and Rasterio reads it.
+pub(crate) fn cloud_optimised(folder: &Path) -> Option<Value> {
+    let mut script = python("validate_cog.py", "rio-cogeo and Rasterio")?;
+    Some(serde_json::from_str(&output(script.arg(folder))).unwrap())
 }
 
 /// What the program prints; it must succeed.

@@ -20,6 +20,32 @@ fn the_list_of_products_is_up_to_date() {
     );
 }
 
+/// Columns can be attributes in Python (`frame.return_class`), and a description needs no other column to be understood.
+#[test]
+fn columns_have_names_and_descriptions_of_their_own() {
+    const RESERVED: [&str; 35] = [
+        "False", "None", "True", "and", "as", "assert", "async", "await", "break", "class",
+        "continue", "def", "del", "elif", "else", "except", "finally", "for", "from", "global",
+        "if", "import", "in", "is", "lambda", "nonlocal", "not", "or", "pass", "raise", "return",
+        "try", "while", "with", "yield",
+    ];
+    let text = areograph::products::documentation(declarations());
+    let columns = text.lines().filter_map(|line| {
+        let cells: Vec<&str> = line.split(" | ").collect();
+        let name = cells[0].strip_prefix("| `")?.strip_suffix('`')?;
+        (cells.len() == 4).then(|| (name, cells[3]))
+    });
+    let mut count = 0;
+    for (name, description) in columns {
+        assert!(!RESERVED.contains(&name), "{name}");
+        for other in ["likewise", "the same of", "as above", "ditto"] {
+            assert!(!description.contains(other), "{name}: {description}");
+        }
+        count += 1;
+    }
+    assert!(count > 500, "{count} columns");
+}
+
 #[test]
 fn schemas_are_up_to_date() {
     let mut schemas = areograph::products::schemas(declarations());

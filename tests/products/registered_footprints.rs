@@ -1,7 +1,14 @@
 //! The table of registered footprints against the tables that it joins, and in the programs of its readers.
-#![allow(clippy::unwrap_used, reason = "helpers of tests may fail loudly")]
+#![allow(
+    clippy::disallowed_methods,
+    clippy::unwrap_used,
+    reason = "helpers of tests may fail loudly"
+)]
 
 use std::{collections::BTreeMap, path::Path};
+
+use arrow_array::{cast::AsArray as _, types::Float64Type};
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
 use crate::common::{
     json,
@@ -41,6 +48,7 @@ fn footprints_inside_images_have_one_row_with_both_places() {
             "topography_m",
             "orbit",
             "shot",
+            "return_class",
         ] {
             assert_eq!(row[name], footprint[name], "{name}");
         }
@@ -75,6 +83,48 @@ fn footprints_inside_images_have_one_row_with_both_places() {
     );
     let shown = |id: &str| registered.iter().filter(|row| row["image"] == id).count();
     assert_eq!(shown("E02-00665") + shown("E02-01453"), registered.len());
+}
+
+/// Places of adjusted footprints, by formulas of the test's own.
+#[test]
+fn adjusted_footprints_have_places_on_the_map() {
+    let folder = site_run("gusev_crater");
+    let file = std::fs::File::open(folder.join("adjusted_footprints.parquet")).unwrap();
+    let file = ParquetRecordBatchReaderBuilder::try_new(file).unwrap();
+    let adjusted = file.build().unwrap().next().unwrap().unwrap();
+    let footprints = rows(&folder.join("footprints.csv"));
+    let real = |name: &str| {
+        let column = adjusted.column_by_name(name).unwrap();
+        column.as_primitive::<Float64Type>().values().to_vec()
+    };
+    let names = adjusted.column_by_name("footprint").unwrap();
+    let names = names.as_string::<i32>();
+    assert!(adjusted.num_rows() > 50);
+    for round in ["", "adjusted_"] {
+        let [x, y, z, longitude, latitude] = ["x_m", "y_m", "z_m", "longitude_deg", "latitude_deg"]
+            .map(|name| real(&format!("{round}{name}")));
+        for row in 0..adjusted.num_rows() {
+            let expected_deg = [
+                y[row].atan2(x[row]).to_degrees().rem_euclid(360.0),
+                z[row].atan2(x[row].hypot(y[row])).to_degrees(),
+            ];
+            for (found, expected) in [longitude[row], latitude[row]].iter().zip(expected_deg) {
+                // Rounding.
+                assert!((found - expected).abs() < 1e-9, "{found} {expected}");
+            }
+            if round.is_empty() {
+                let (_, footprint) = names.value(row).rsplit_once(':').unwrap();
+                let footprint = &footprints[footprint.parse::<usize>().unwrap()];
+                for (name, found) in [
+                    ("longitude_deg", longitude[row]),
+                    ("latitude_deg", latitude[row]),
+                ] {
+                    // Radius and angles were Cartesian in between.
+                    assert!((number(footprint, name) - found).abs() < 1e-9);
+                }
+            }
+        }
+    }
 }
 
 /// TDB minus UTC in 1999 to 2005, seconds: 32 leap seconds and 32.184 s; TDB departs from TT by up to 1.7 ms.

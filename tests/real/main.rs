@@ -11,6 +11,7 @@ mod kernels_from_folder;
 mod ode_tables;
 mod oriented_cube;
 mod real_adjustment;
+mod real_map;
 mod real_orientation;
 mod real_ranges;
 mod real_registration;

@@ -65,7 +65,7 @@ const TO_CAMERA: [f64; 9] = [
     0.999_997_217_494_87,
 ];
 
-fn cube() -> Option<PathBuf> {
+pub(crate) fn cube() -> Option<PathBuf> {
     common::real_data("moc_cubes/E0201461.tiny.cub", "a real oriented cube")
 }
 
@@ -121,11 +121,14 @@ fn camera(cube: &Path, et_s: f64) -> (Vector3<f64>, Matrix3<f64>) {
     )
 }
 
-/// Where a ray from the camera is 3 393 km from the centre of Mars.
-fn ground(position_m: &Vector3<f64>, look: &Vector3<f64>) -> Vector3<f64> {
+/// Distance of the shots of most sites from the centre of Mars, metres.
+const RADIUS_M: f64 = 3_393_000.0;
+
+/// Where a ray from the camera is at this distance from the centre of Mars.
+fn ground(position_m: &Vector3<f64>, look: &Vector3<f64>, radius_m: f64) -> Vector3<f64> {
     let look = look.normalize();
     let along_m = position_m.dot(&look);
-    let square = along_m * along_m - position_m.norm_squared() + 3_393_000.0_f64.powi(2);
+    let square = along_m * along_m - position_m.norm_squared() + radius_m.powi(2);
     position_m + look * (-along_m - square.sqrt())
 }
 
@@ -174,8 +177,8 @@ fn column(table: &RecordBatch, name: &str) -> Vec<f64> {
     column.as_primitive::<Float64Type>().values().to_vec()
 }
 
-/// A site of the cube with shots, in the layout of the ODE, where `places` (lines and samples) look.
-fn site(path: &Path, places: &[[f64; 2]]) -> Case {
+/// A site of the cube with shots at this radius, in the layout of the ODE, where `places` (lines and samples) look.
+pub(crate) fn site(path: &Path, places: &[[f64; 2]], radius_m: f64) -> Case {
     let case = Case::empty();
     let detector = Detector::new(usual_instrument(), 2, 0, 1_024);
     let mut table =
@@ -183,7 +186,8 @@ fn site(path: &Path, places: &[[f64; 2]]) -> Case {
             .to_owned();
     for (shot, [line, sample]) in places.iter().enumerate() {
         let (position_m, to_mars) = camera(path, START_S + line * PERIOD_S);
-        let at = Spherical::from_xyz_m(&ground(&position_m, &(to_mars * detector.look(*sample))));
+        let look = to_mars * detector.look(*sample);
+        let at = Spherical::from_xyz_m(&ground(&position_m, &look, radius_m));
         let et_s = -26_269_612.0 + 0.1 * shot as f64;
         writeln!(
             table,
@@ -218,7 +222,7 @@ fn ground_seen_by_its_tables_comes_back_to_line_and_sample() {
     let places: Vec<[f64; 2]> = (0..40)
         .map(|at| [20.5 + 200.0 * f64::from(at), 12.0 + 25.0 * f64::from(at)])
         .collect();
-    let case = site(&path, &places);
+    let case = site(&path, &places, RADIUS_M);
     let outcome = case.outcome(case.run());
     let orientation = case.path("out/cube/images/E02-01461/orientation.json");
     assert!(orientation.exists(), "{outcome}");
@@ -260,7 +264,7 @@ fn ground_seen_by_its_tables_comes_back_to_line_and_sample() {
 #[test]
 fn its_map_projected_pixels_are_refused_as_samples() {
     let Some(path) = cube() else { return };
-    let case = site(&path, &[[4_000.0, 500.0], [4_100.0, 500.0]]);
+    let case = site(&path, &[[4_000.0, 500.0], [4_100.0, 500.0]], RADIUS_M);
     case.replace(
         "site.toml",
         "cube = \"E0201461.cub\"\n",

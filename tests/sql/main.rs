@@ -121,7 +121,7 @@ fn comparison() -> impl Strategy<Value = String> {
             "source_file in ('ap19020k.b', 'none.b')",
             "source_file <> 'ap19030l.b'",
             "source_file like '%k.b'",
-            "class = 1",
+            "return_class = 1",
             "channel in (1, 2)",
             "abs(latitude_deg) > 70",
             "longitude_deg > latitude_deg",
@@ -222,7 +222,7 @@ fn answers_of_the_command_are_those_of_a_search() {
         ["asked.parquet", "asked.csv", "found.parquet"].map(|name| folder.path().join(name));
     // The box and the defaults of `pedr search`.
     let question = "select * from shots where (longitude_deg >= 190 or longitude_deg <= 170) and latitude_deg \
-                    between -60 and 60 and class = 1 and channel between 1 and 4 and attitude_flag in (0, 1)";
+                    between -60 and 60 and return_class = 1 and channel between 1 and 4 and attitude_flag in (0, 1)";
     for out in [&asked, &csv] {
         let output = sql(&archive, &[question, "--out", out.to_str().unwrap()]);
         assert!(

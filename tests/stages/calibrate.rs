@@ -529,6 +529,19 @@ fn a_calibration_applies_to_another_orbit() {
         );
         let path = folder.path().join("applied.json");
         fs::write(&path, &applied.isd).unwrap();
+        let of_other_orbit = [&calibrated[index], &path].map(|path| {
+            let of = read_isd(path).unwrap().instrument.calibration.unwrap();
+            of.is_of_other_orbit
+        });
+        assert_eq!(of_other_orbit, [false, true]);
+        let frames = "\"constant_frames\"";
+        let without = fs::read_to_string(&calibrated[index]).unwrap();
+        let without = without.replace(frames, "\"unused\"");
+        let bare = folder.path().join("bare.json");
+        fs::write(&bare, without).unwrap();
+        let as_given = apply_calibration(&[bare], &isd).unwrap().isd;
+        // Frames that the calibrated support data do not state remain those of the image.
+        assert_eq!(as_given, applied.isd);
         let [before, after] = [&isd, &path].map(|path| {
             let support = read_isd(path).unwrap();
             let rows = control

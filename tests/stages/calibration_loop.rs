@@ -9,6 +9,8 @@
 
 use crate::common;
 
+mod curves;
+
 use std::{
     collections::BTreeMap,
     fs,

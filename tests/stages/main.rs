@@ -6,6 +6,7 @@ mod adjusted_points;
 mod attitude_edges;
 mod calibrate;
 mod calibration_loop;
+mod calibration_series;
 #[path = "../common/mod.rs"]
 mod common;
 mod light_time;

@@ -12,6 +12,7 @@
 
 use crate::common;
 
+pub(crate) mod curves;
 mod model;
 mod pictures;
 mod refused;

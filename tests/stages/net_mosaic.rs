@@ -1,12 +1,14 @@
 //! The mosaic of a synthetic net, whose ground has a known brightness at every place of the map.
 #![allow(
+    clippy::format_push_string,
+    clippy::too_many_lines,
     clippy::disallowed_methods,
     clippy::unwrap_used,
     clippy::panic,
     reason = "helpers of tests work in temporary folders and may fail loudly"
 )]
 
-use std::{fs, path::Path};
+use std::{fs, path::Path, sync::LazyLock};
 
 use areograph::{
     config::{Document as _, NetConfig},
@@ -14,13 +16,20 @@ use areograph::{
     flow::{RunOutcome, Task},
     scene::write_plane_scene,
 };
-use serde_json::Value;
+use serde_json::{Value, json};
 use tiff::{
     decoder::{Decoder, DecodingResult},
+    encoder::{TiffEncoder, colortype::Gray8},
     tags::Tag,
 };
 
-use crate::common::{assert_keeps_schema, flows::run_into, json, number, readers::program};
+use crate::common::{
+    assert_keeps_schema,
+    flows::run_into,
+    golden::assert_messages,
+    json, number,
+    readers::{cloud_optimised, program},
+};
 
 const SEED: u64 = 3;
 /// Cells between compared places of a picture, cells to either side, and cells of a compared square.
@@ -28,12 +37,26 @@ const APART: usize = 40;
 const REACH: i64 = 10;
 const HALF: i64 = 6;
 
-/// Changes the fields of a row of the table of pictures.
-type Change<'a> = &'a dyn Fn(&mut Vec<String>);
-
-fn scene() -> tempfile::TempDir {
+/// The scene, written once.
+static SCENE: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
     let folder = tempfile::tempdir().unwrap();
     write_plane_scene(&folder.path().join("net"), SEED).unwrap();
+    folder
+});
+
+/// A copy of the scene.
+fn scene() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::create_dir_all(folder.path().join("net/images")).unwrap();
+    for below in ["net", "net/images"] {
+        for entry in fs::read_dir(SCENE.path().join(below)).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_file() {
+                let to = folder.path().join(below).join(path.file_name().unwrap());
+                fs::copy(&path, to).unwrap();
+            }
+        }
+    }
     folder
 }
 
@@ -243,6 +266,16 @@ fn pictures_lie_on_the_map_where_they_state() {
         page.contains("Mosaic of the pictures, north up") && page.contains("mosaic_source.tif")
     );
     as_gdal_reads_it(&out.join("mosaic.tif"), &mosaic, &["Mercator"]);
+    let Some(rasters) = cloud_optimised(&out) else {
+        return;
+    };
+    for (name, raster) in [("mosaic.tif", &mosaic), ("mosaic_source.tif", &sources)] {
+        let shown = raster.cells.iter().filter(|cell| **cell > 0).count();
+        assert_eq!(
+            rasters[name],
+            json!([raster.size[0], raster.size[1], shown, true])
+        );
+    }
 }
 
 #[test]
@@ -333,42 +366,147 @@ fn the_direction_of_y_does_not_change_the_mosaic() {
     assert!(bytes[0] == bytes[1]);
 }
 
-#[test]
-fn images_that_do_not_fit_are_refused() {
-    let refused = |change: Change<'_>| {
-        let folder = scene();
-        change_pictures(folder.path(), change);
-        run(folder.path()).unwrap_err().to_string()
-    };
-    let message = refused(&|fields| {
-        if fields[0] == "P02" {
-            fields[3] = "images/other.tif".to_owned();
+/// The message for a net with a change in its folder.
+fn refused(change: impl Fn(&Path)) -> String {
+    let folder = scene();
+    change(&folder.path().join("net"));
+    let failure = run(folder.path()).unwrap_err();
+    let path = format!("{}/", folder.path().join("net").display());
+    failure.to_string().replace(&path, "")
+}
+
+/// With a field of the row of a picture replaced.
+fn with_field(folder: &Path, picture: &str, at: usize, change: impl Fn(&str) -> String) {
+    change_pictures(folder.parent().unwrap(), |fields| {
+        if fields[0] == picture {
+            fields[at] = change(&fields[at]);
         }
     });
-    assert!(
-        message.contains("picture P02") && message.contains("other.tif, which does not exist"),
-        "{message}"
-    );
-    // A corner far away, and pixels of half the size.
-    for (field, scale, shift) in [(5, 1.0, 1e4), (6, 0.5, 0.0)] {
-        let message = refused(&|fields| {
-            if fields[0] == "P03" {
-                let number: f64 = fields[field].parse().unwrap();
-                fields[field] = (scale * number + shift).to_string();
-            }
-        });
-        assert!(
-            message.contains("picture P03: point ") && message.contains("lines of "),
-            "{message}"
-        );
-    }
-    let folder = scene();
-    let path = folder.path().join("net/pictures.csv");
-    let text = fs::read_to_string(&path).unwrap() + "P99,,,images/P01.tif,0,0,1\n";
-    fs::write(&path, text).unwrap();
-    let message = run(folder.path()).unwrap_err().to_string();
-    assert!(
-        message.contains("picture P99 has an image and no place in the net"),
-        "{message}"
-    );
+}
+
+fn in_net_file(folder: &Path, was: &str, is: &str) {
+    let toml = folder.join("net.toml");
+    let text = fs::read_to_string(&toml).unwrap();
+    assert!(text.contains(was), "{text}");
+    fs::write(&toml, text.replace(was, is)).unwrap();
+}
+
+/// The image of a picture cropped to some lines and samples.
+fn crop(path: &Path, size: [usize; 2]) {
+    let mut decoder = Decoder::new(fs::File::open(path).unwrap()).unwrap();
+    let columns = decoder.dimensions().unwrap().0 as usize;
+    let DecodingResult::U8(pixels) = decoder.read_image().unwrap() else {
+        panic!("other numbers");
+    };
+    let lines = pixels.chunks(columns).take(size[0]);
+    let cropped: Vec<u8> = lines.flat_map(|line| line[..size[1]].to_vec()).collect();
+    let [lines, samples] = size.map(|of| u32::try_from(of).unwrap());
+    let mut encoder = TiffEncoder::new(fs::File::create(path).unwrap()).unwrap();
+    encoder
+        .write_image::<Gray8>(samples, lines, &cropped)
+        .unwrap();
+}
+
+#[test]
+fn images_that_do_not_fit_are_refused() {
+    let number = |of: &str| of.parse::<f64>().unwrap();
+    let told = [
+        (
+            "an image that is missing",
+            refused(|net| with_field(net, "P02", 3, |_| "images/other.tif".to_owned())),
+        ),
+        (
+            "a folder as an image",
+            refused(|net| with_field(net, "P02", 3, |_| "images".to_owned())),
+        ),
+        (
+            "two pictures with one image, by another path",
+            refused(|net| with_field(net, "P02", 3, |_| "images/../images/P01.tif".to_owned())),
+        ),
+        (
+            "a picture with two images",
+            refused(|net| {
+                let path = net.join("pictures.csv");
+                let text = fs::read_to_string(&path).unwrap() + "P02,,,images/P01.tif,0,0,1\n";
+                fs::write(&path, text).unwrap();
+            }),
+        ),
+        (
+            "a picture without measurements",
+            refused(|net| {
+                fs::copy(net.join("images/P01.tif"), net.join("images/P99.tif")).unwrap();
+                let path = net.join("pictures.csv");
+                let text = fs::read_to_string(&path).unwrap() + "P99,,,images/P99.tif,0,0,1\n";
+                fs::write(&path, text).unwrap();
+            }),
+        ),
+        (
+            "a corner far away",
+            refused(|net| with_field(net, "P03", 5, |of| (number(of) + 1e4).to_string())),
+        ),
+        (
+            "pixels of half the size",
+            refused(|net| with_field(net, "P03", 6, |of| (0.5 * number(of)).to_string())),
+        ),
+        (
+            "an image of half the size",
+            refused(|net| crop(&net.join("images/P07.tif"), [100, 100])),
+        ),
+        (
+            "an image of another kind",
+            refused(|net| fs::write(net.join("images/P07.tif"), "no image").unwrap()),
+        ),
+        (
+            "half of a file",
+            refused(|net| {
+                let path = net.join("images/P07.tif");
+                let bytes = fs::read(&path).unwrap();
+                fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+            }),
+        ),
+        (
+            "too many images",
+            refused(|net| {
+                let path = net.join("pictures.csv");
+                let mut text = fs::read_to_string(&path).unwrap();
+                for picture in 101..=156 {
+                    let image = format!("images/P{picture}.tif");
+                    fs::copy(net.join("images/P01.tif"), net.join(&image)).unwrap();
+                    text += &format!("P{picture},,,{image},0,0,1\n");
+                }
+                fs::write(&path, text).unwrap();
+            }),
+        ),
+        (
+            "a mosaic that is too large",
+            refused(|net| in_net_file(net, "[map]", "[map]\ncell_m = 0.5")),
+        ),
+        (
+            "cells larger than pictures",
+            refused(|net| in_net_file(net, "[map]", "[map]\ncell_m = 9.9e6")),
+        ),
+        (
+            "cells of no size",
+            refused(|net| in_net_file(net, "[map]", "[map]\ncell_m = 0")),
+        ),
+        (
+            "images and a film correction",
+            refused(|net| {
+                let mut ticks = "picture,tick,x,y,known_x,known_y\n".to_owned();
+                for picture in 1..=25 {
+                    for (tick, x, y) in [
+                        ("lower_left", -1, -1),
+                        ("lower_right", 1, -1),
+                        ("upper_right", 1, 1),
+                        ("upper_left", -1, 1),
+                    ] {
+                        ticks += &format!("P{picture:02},{tick},{x},{y},{x},{y}\n");
+                    }
+                }
+                fs::write(net.join("ticks.csv"), ticks).unwrap();
+                in_net_file(net, "[map]", "[film]\nfiles = [\"ticks.csv\"]\n[map]");
+            }),
+        ),
+    ];
+    assert_messages("net_images_refused", &told);
 }

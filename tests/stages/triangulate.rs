@@ -293,6 +293,31 @@ fn change(folder: &Path, table: &str, change: impl Fn(usize, Vec<String>) -> Opt
     fs::write(path, changed.join("\n") + "\n").unwrap();
 }
 
+/// All ticks of the pictures, which are `2 * size` units wide.
+fn write_ticks(folder: &Path, size: f64, film: impl Fn(Place) -> Place) {
+    let mut ticks = "picture,tick,x,y,known_x,known_y\n".to_owned();
+    for picture in 1..=25 {
+        for (tick, x, y) in [
+            ("lower_left", -1.0, -1.0),
+            ("lower_right", 1.0, -1.0),
+            ("upper_right", 1.0, 1.0),
+            ("upper_left", -1.0, 1.0),
+            ("lower", 0.0, -1.0),
+            ("upper", 0.0, 1.0),
+            ("left", -1.0, 0.0),
+            ("right", 1.0, 0.0),
+        ] {
+            let known = Place::new(x * size, y * size);
+            let seen = film(known);
+            ticks += &format!(
+                "P{picture:02},{tick},{:.12},{:.12},{},{}\n",
+                seen.re, seen.im, known.re, known.im
+            );
+        }
+    }
+    fs::write(folder.join("net/ticks.csv"), ticks).unwrap();
+}
+
 #[test]
 fn film_boxes_and_lines_downwards_give_the_same_net() {
     let plain = scene(&[]);
@@ -338,27 +363,7 @@ fn film_boxes_and_lines_downwards_give_the_same_net() {
         ),
     )
     .unwrap();
-    let mut ticks = "picture,tick,x,y,known_x,known_y\n".to_owned();
-    for picture in 1..=25 {
-        for (tick, x, y) in [
-            ("lower_left", -1.0, -1.0),
-            ("lower_right", 1.0, -1.0),
-            ("upper_right", 1.0, 1.0),
-            ("upper_left", -1.0, 1.0),
-            ("lower", 0.0, -1.0),
-            ("upper", 0.0, 1.0),
-            ("left", -1.0, 0.0),
-            ("right", 1.0, 0.0),
-        ] {
-            let known = Place::new(x * size, y * size);
-            let seen = film(known);
-            ticks += &format!(
-                "P{picture:02},{tick},{:.12},{:.12},{},{}\n",
-                seen.re, seen.im, known.re, known.im
-            );
-        }
-    }
-    fs::write(other.path().join("net/ticks.csv"), ticks).unwrap();
+    write_ticks(other.path(), size, film);
     let found = triangulated(other.path()).unwrap();
     for (point, expected) in found.points.iter().zip(&expected.points) {
         let off = [0, 1].map(|axis| point.place_m[axis] - expected.place_m[axis]);
@@ -503,6 +508,62 @@ fn nets_without_a_solution_are_refused_by_name() {
         ),
     ];
     assert_messages("net_refused", &told);
+}
+
+#[test]
+fn films_without_a_correction_are_refused_by_name() {
+    type Row<'a> = &'a dyn Fn(Vec<String>) -> Option<Vec<String>>;
+    let told = |of: [&str; 2], edit: Row<'_>| {
+        let film = "[film]\nfiles = [\"ticks.csv\"]\n[controls]";
+        refused(&[("[controls]", film)], |folder| {
+            write_ticks(folder, 8_000.0, |known| known);
+            change(folder, "ticks.csv", |_, cells| {
+                if [&*cells[0], &*cells[1]] == of || (of[1].is_empty() && cells[0] == of[0]) {
+                    edit(cells)
+                } else {
+                    Some(cells)
+                }
+            });
+        })
+    };
+    let with = |at: usize, text: &'static str| {
+        move |mut cells: Vec<String>| {
+            text.clone_into(&mut cells[at]);
+            Some(cells)
+        }
+    };
+    let messages = [
+        ("a picture without ticks", told(["P07", ""], &|_| None)),
+        (
+            "a corner tick missing",
+            told(["P07", "upper_left"], &|_| None),
+        ),
+        ("a mid-edge tick missing", told(["P07", "left"], &|_| None)),
+        (
+            "a tick of another name",
+            told(["P07", "upper_left"], &with(1, "top_left")),
+        ),
+        (
+            "a tick in two rows",
+            told(["P07", "upper_left"], &with(1, "upper_right")),
+        ),
+        (
+            "a tick without a number",
+            told(["P07", "lower_left"], &with(2, "edge")),
+        ),
+        (
+            "two corners at the same place",
+            told(["P07", "lower_left"], &|mut cells| {
+                (cells[2], cells[3]) = ("8000".to_owned(), "-8000".to_owned());
+                Some(cells)
+            }),
+        ),
+        (
+            "a mid-edge tick far away",
+            told(["P07", "left"], &with(3, "9000")),
+        ),
+    ];
+    assert_messages("net_film_refused", &messages);
 }
 
 #[test]

@@ -197,6 +197,7 @@ fn matched_ties_of_realistic_images_are_kept_and_heights_scatter_as_stated() {
             seed: seed.into(),
             day_s: 600.0,
             passes: 0,
+            ties_at_shots: false,
             errors: SceneErrors::realistic(roughness),
         });
         let mut run = areograph();

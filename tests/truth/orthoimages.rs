@@ -21,7 +21,12 @@ use tiff::{
     tags::Tag,
 };
 
-use crate::common::{self, flows::run_into, pair::write_pair, readers};
+use crate::common::{
+    self,
+    flows::run_into,
+    pair::{write_pair, write_pair_on_shots},
+    readers,
+};
 
 /// Distance by which the support data of the second image, which looks down, are displaced along its flight, metres.
 const ALONG_M: f64 = 300.0;
@@ -156,6 +161,23 @@ fn is_over_common_squares(products: &Path, pair: &Value) {
     }
 }
 
+/// Every raster is valid as a cloud-optimised file, and has the cells that Rasterio reads.
+fn are_cloud_optimised(products: &Path) {
+    let Some(rasters) = readers::cloud_optimised(products) else {
+        return;
+    };
+    let rasters = rasters.as_object().unwrap();
+    assert!(rasters.len() >= 12, "{:?}", rasters.keys());
+    for (name, raster) in rasters {
+        assert!(common::number(&raster[2]) > 0.0, "{name}: {raster}");
+    }
+    for name in ["mosaic.tif", "mosaic_source.tif", "mosaic_before.tif"] {
+        let Raster { size, bytes, .. } = Raster::read(&products.join(name));
+        let shown = bytes.iter().filter(|byte| **byte > 0).count();
+        assert_eq!(rasters[name], json!([size[0], size[1], shown, true]));
+    }
+}
+
 /// GDAL reads the mosaics with their sizes and empty cells.
 fn are_read_by_gdal(products: &Path) {
     for name in ["mosaic.tif", "mosaic_source.tif", "mosaic_before.tif"] {
@@ -250,4 +272,61 @@ fn a_known_misregistration_is_measured_before_the_adjustment_and_gone_after_it()
     assert!(report.contains("The orthoimages of s1 and nd differ by"));
     assert!(report.contains("At the seam of s1 and nd, the images differ by"));
     are_read_by_gdal(&products);
+    are_cloud_optimised(&products);
+}
+
+/// Root mean square distance between the orthoimages of the two images of a pair on the ground between shots that are this much too
+/// high, metres, and the products.
+fn apart_on_shots(folder: &Path, too_high_m: f64) -> (f64, Value) {
+    write_pair_on_shots(folder);
+    let site = folder.join("pair.toml");
+    let shots = folder.join("shots.csv");
+    let table = fs::read_to_string(&shots).unwrap();
+    let (head, rows) = table.split_once('\n').unwrap();
+    let head: Vec<&str> = head.split(',').collect();
+    let raised = rows.lines().map(|row| {
+        let cells = row.split(',').zip(&head).map(|(cell, name)| match *name {
+            "radius_m" | "radius_crossover_m" => {
+                (cell.parse::<f64>().unwrap() + too_high_m).to_string()
+            }
+            _ => cell.to_owned(),
+        });
+        cells.collect::<Vec<_>>().join(",")
+    });
+    let raised: Vec<String> = raised.collect();
+    fs::write(
+        &shots,
+        format!("{}\n{}\n", head.join(","), raised.join("\n")),
+    )
+    .unwrap();
+    let config = SiteConfig::load(&site).unwrap().config;
+    let outcome = run_into(Task::Site(&config), &folder.join("out"), false).unwrap();
+    let document = common::json(&outcome.folder.join("orthoimages.json"));
+    assert!(outcome.folder.join("mosaic.tif").exists());
+    assert!(!outcome.folder.join("surface_above_sphere.tif").exists());
+    let images = document["orthoimages"].as_array().unwrap();
+    let names = ["mosaic.tif", "mosaic_source.tif", "orthoimage.tif"];
+    is_of_its_sources(&outcome.folder, names, images);
+    (
+        common::number(&document["pairs"][0]["before"]["rms_m"]),
+        document,
+    )
+}
+
+/// Both images show the same ground, with the true orientation: where heights are right, their orthoimages agree.
+#[test]
+fn orthoimages_on_the_ground_between_shots_agree() {
+    let [right, wrong] = [0.0, 600.0].map(|too_high_m| {
+        let folder = tempfile::tempdir().unwrap();
+        let (apart_m, document) = apart_on_shots(folder.path(), too_high_m);
+        println!("shots {too_high_m} m too high: orthoimages {apart_m:.1} m apart");
+        for image in document["orthoimages"].as_array().unwrap() {
+            println!("{image}");
+            // Support data state no accuracy.
+            assert!(image.get("shared_sigma_m").is_none() && image.get("drift_m").is_none());
+        }
+        apart_m
+    });
+    // Metres: the standard deviation that the heights give the image that looks aside; 600 m displace it by more than ten times as much.
+    assert!(right < 18.0 && wrong > 180.0, "{right} {wrong}");
 }

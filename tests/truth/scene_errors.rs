@@ -72,6 +72,7 @@ impl Mission {
             seed,
             day_s: 600.0,
             passes: 0,
+            ties_at_shots: false,
             errors,
         };
         write_scene(&folder.path().join("mission"), &options).unwrap();

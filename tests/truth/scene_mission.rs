@@ -40,6 +40,7 @@ const SHORT: SceneOptions = SceneOptions {
     seed: 3,
     day_s: 1_800.0,
     passes: 2,
+    ties_at_shots: false,
     errors: SceneErrors::demo(),
 };
 

@@ -69,6 +69,9 @@ pub struct Calibrated {
     pub camera: String,
     /// Whether its verdict is valid.
     pub valid: bool,
+    /// Whether it was determined in another orbit than that of the image: its angles contain the error of that orbit.
+    #[serde(default)]
+    pub is_of_other_orbit: bool,
 }
 
 impl Instrument {

@@ -16,6 +16,7 @@ use super::{
         zero_or,
     },
     readings::{DecisionFile, ReadingsDecision},
+    relief::ReliefForPlan,
     unknowns::{PositionUnknowns, RotationUnknowns},
 };
 
@@ -114,14 +115,19 @@ declare_table! {
             "the orbit from the kernels",
             "the orbit from the kernels, shifted by its mean difference from the PEDR orbit over the profile",
         )).or(false),
-        /// Whether heights of tie points on slopes of the MOLA surface also determine the plan positions of the images.
-        /// This is useful where, according to the report, relief determines the position with a standard deviation of
-        /// less than half the a priori value: on rough ground, with precise tie points, and with many profiles near
-        /// them.
-        relief_for_plan: bool = key(yes_or_no(
-            "slopes only increase the uncertainty of heights",
-            "each profile may be offset in plan, and tie points shift until their heights fit",
-        )).or(false),
+        /// Whether heights of tie points on slopes of the MOLA surface also determine the plan positions of the images. Each
+        /// profile may then be offset in plan by `laser_surface.profile_plan_sigma_m`, less what its crossovers show. Relief
+        /// is precise on rough ground, with precise tie points, and with many profiles near them. "auto" adjusts without and with
+        /// relief, and uses relief where the stated standard deviations of the mean position decrease by at least a quarter
+        /// on one axis.
+        relief_for_plan: ReliefForPlan = key(words_of(
+            ReliefForPlan::WORDS,
+            [
+                "relief is used where it makes the position more precise",
+                "each profile may be offset in plan, and tie points shift until their heights fit",
+                "slopes only increase the uncertainty of heights",
+            ],
+        )).or(ReliefForPlan::Auto),
         /// Whether the position of a laser spot in a simultaneous image is an observation: the mounting of camera and
         /// laser on one bus determines this position, regardless of the attitude. The option requires profiles that are
         /// simultaneous with the images and whose positions are known to `laser_surface.profile_plan_sigma_m`. Each

@@ -258,7 +258,8 @@ declare_table! {
         /// `longitude_deg` (east), `latitude_deg` (areocentric) and `radius_m` (from the centre of the body, not a
         /// height above a datum). Where known: `sigma_line`, `sigma_sample`, `sigma_horizontal_m`, `sigma_vertical_m`,
         /// and the contributions of matching to the latter two, `sigma_matching_horizontal_m` and
-        /// `sigma_matching_vertical_m`.
+        /// `sigma_matching_vertical_m`. Errors that all points of a laser profile share are part of `sigma_horizontal_m` and
+        /// `sigma_vertical_m`; where known: `profile`, `sigma_shared_horizontal_m` and `sigma_shared_vertical_m`.
         #[serde(skip)]
         files: Vec<PathBuf> = key(Globs(&["csv"])).or(Vec::new()).example(r#"["control.csv"]"#),
         /// Standard deviation of measured lines and samples, if missing from the table.

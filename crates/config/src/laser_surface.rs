@@ -24,8 +24,8 @@ declare_table! {
         plan_sigma_m: f64 = key(zero_or(1e-3, 1e5)).or(SurfaceOptions::default().plan_sigma_m),
         /// Standard deviation of the plan position of a profile, per axis (100 m horizontally for MOLA, Neumann et al.
         /// 2001). The stated accuracies of footprints include this value. It is also used in the test for misplaced
-        /// profiles and, where `adjustment.relief_for_plan` or `adjustment.common_bus` is "yes", as the a priori
-        /// standard deviation of the shift of a profile.
+        /// profiles and, where relief or the common bus determines the position (`adjustment.relief_for_plan`,
+        /// `adjustment.common_bus`), as the a priori standard deviation of the shift of a profile.
         profile_plan_sigma_m: f64 = key(from_to(1e-3, 1e5)).or(70.0),
         /// Lower limit of the roughness estimated from the shots: root mean square difference of heights 300 m apart.
         roughness_min_m: f64 = key(from_to(0.01, 1e4)).or(SurfaceOptions::default().roughness_min_m),

@@ -42,6 +42,7 @@ mod problems;
 mod products;
 mod range_check;
 mod readings;
+mod relief;
 mod service;
 mod shots;
 mod site;
@@ -91,6 +92,7 @@ pub use problems::Problems;
 pub use products::{ProductsConfig, ShotFormat};
 pub use range_check::{RangeCheckConfig, SCAN_STEPS_MAX};
 pub use readings::ReadingsDecision;
+pub use relief::ReliefForPlan;
 pub use service::{
     AlertKind, ChangesConfig, FetchConfig, FreshnessConfig, HookConfig, HttpConfig, MovedConfig,
     RetentionConfig, ScheduleConfig, ServiceConfig, ServiceInputs, ServiceOutputs, WorkersConfig,

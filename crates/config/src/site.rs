@@ -200,21 +200,22 @@ fn across_tables(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
 fn matched_images(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     let with_pixels = site.images.iter().filter(|image| image.pixels.is_some());
     if site.ties.matched && site.images.len() > 1 && with_pixels.count() < 2 {
-        keys.refuse_below(
-            "ties",
-            "match",
-            "at least two images with images.pixels, or false",
-        );
+        let expected = "at least two images with images.pixels, or false";
+        keys.refuse_below("ties", "match", expected);
     }
 }
 
-/// A terrain model requires at least two images with pixels.
+/// A terrain model requires at least two images with pixels, and orthoimages require one.
 fn images_of_surface(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
-    if site.surface.cell_m.is_none() {
-        return;
-    }
     let with_pixels = site.images.iter().filter(|image| image.pixels.is_some());
     let known: Vec<&str> = with_pixels.map(|image| &*image.id).collect();
+    if site.surface.cell_m.is_none() {
+        if site.surface.orthoimage_cell_m.is_some() && known.is_empty() {
+            let expected = "no orthoimage_cell_m, or an image with images.pixels";
+            keys.refuse_below("surface", "orthoimage_cell_m", expected);
+        }
+        return;
+    }
     match &site.surface.images {
         None if known.len() >= 2 => {}
         None => {

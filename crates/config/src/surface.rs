@@ -11,14 +11,14 @@ use super::{
 declare_table! {
     /// A terrain model that areograph computes from all pairs of images with `pixels`, with the adjusted orientation if
     /// there is one: `surface_above_sphere.tif`, its standard deviations, and its comparison with the altimeter. Without `cell_m`,
-    /// no terrain model is computed.
+    /// no terrain model is computed, and orthoimages are on the ground between the altimeter's shots.
     pub struct SurfaceConfig: Deserialize {
         /// Edge of a cell of the terrain model, usually three pixels of the coarser image; each height refers to a
         /// square of 17 by 17 pixels. Cells smaller than a pixel are refused. For cells larger than six pixels, images
         /// are compared at a coarser resolution, which is faster.
         cell_m: Option<f64> = key(above_to(0.0, 1e5)).unused("15.0"),
-        /// Edge of a cell of orthoimages on this terrain model, usually the ground size of an image pixel. Orthoimages
-        /// are computed from every image with `pixels` and tie points; without this key, none is computed.
+        /// Edge of a cell of orthoimages, usually the ground size of an image pixel. Orthoimages are computed from every image with
+        /// `pixels`, in an adjusted site from those with tie points; without this key, none is computed.
         orthoimage_cell_m: Option<f64> = key(above_to(0.0, 1e5)).unused("5.0"),
         /// Whether orthoimages, and their mosaic, are also computed with the orientation from the kernels, for comparison with
         /// the adjusted ones: `orthoimage_before.tif`. Without an adjustment, this key has no effect.
@@ -39,22 +39,20 @@ declare_table! {
 /// Keys that need orthoimages.
 const OF_ORTHOIMAGES: [&str; 3] = ["orthoimages_before", "mosaic", "mosaic_balance"];
 
-/// A requested terrain model has a cell size, orthoimages have a terrain model, and a mosaic has orthoimages.
+/// A requested terrain model has a cell size, and a mosaic has orthoimages.
 fn a_cell_is_given(surface: &SurfaceConfig, keys: &mut Keys<'_, '_>) {
     keys.rule(|| {
         json!({"dependentRequired": {
             "images": ["cell_m"],
-            "orthoimage_cell_m": ["cell_m"],
             "orthoimages_before": ["orthoimage_cell_m"],
             "mosaic": ["orthoimage_cell_m"],
             "mosaic_balance": ["orthoimage_cell_m"],
         }})
     });
-    let needs_model = surface.images.is_some() || surface.orthoimage_cell_m.is_some();
-    if needs_model && keys.span_of("cell_m").is_none() {
+    if surface.images.is_some() && keys.span_of("cell_m").is_none() {
         keys.missing(
             "cell_m",
-            "the edge of a cell in metres (or no table [surface] at all)",
+            "the edge of a cell of the terrain model in metres (or no key images)",
         );
     }
     let needs_orthoimages = OF_ORTHOIMAGES.iter().any(|key| keys.span_of(key).is_some());

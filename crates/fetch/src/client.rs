@@ -18,7 +18,11 @@ use ureq::{
 };
 
 use crate::{
-    archives::Archives, error::FetchError, hashed::hexadecimal, part::Meta, safe::is_name,
+    archives::Archives,
+    error::FetchError,
+    hashed::hexadecimal,
+    headers::{rest_of, wait_of},
+    part::Meta,
 };
 use areograph_base::error::{Error, IoError, Locate as _};
 
@@ -40,6 +44,8 @@ pub(crate) struct Ask<'a> {
     pub(crate) validator: Option<&'a str>,
     /// The file is wanted only if it is not this one.
     pub(crate) known: Option<&'a Meta>,
+    /// Only these bytes are wanted, the first and the last one.
+    pub(crate) range: Option<[u64; 2]>,
     /// Longest time without a byte, where it differs from the limit for files.
     pub(crate) limit: Option<Duration>,
 }
@@ -111,13 +117,18 @@ impl Client {
         if let Some(path) = mirror(url) {
             return of_disk(url, &path);
         }
+        of_response(url, self.respond(url, ask)?, ask)
+    }
+
+    /// The response to a request over HTTP, redirections followed.
+    pub(crate) fn respond(&self, url: &str, ask: Ask<'_>) -> Result<Response<ureq::Body>, Fault> {
         let mut at = url.to_owned();
         for _ in 0..=REDIRECTIONS_MAX {
             let uri = permitted(&at)?;
             let response = self.ask(&uri, ask)?;
             let status = response.status().as_u16();
             if !matches!(status, 301 | 302 | 303 | 307 | 308) {
-                return of_response(url, response, ask);
+                return Ok(response);
             }
             at = redirected(&at, &uri, header(&response, "location").unwrap_or_default())?;
         }
@@ -136,6 +147,9 @@ impl Client {
             request = request
                 .header("range", format!("bytes={}-", ask.from))
                 .header("if-range", validator);
+        }
+        if let Some([first, last]) = ask.range {
+            request = request.header("range", format!("bytes={first}-{last}"));
         }
         if let Some(known) = ask.known {
             if let Some(etag) = &known.etag {
@@ -171,9 +185,10 @@ impl Client {
     }
 }
 
-/// The path of a mirror on a disk.
-fn mirror(url: &str) -> Option<PathBuf> {
-    url.strip_prefix("file://").map(PathBuf::from)
+/// The path of a mirror on a disk; a relative one has no meaning in an address.
+pub(crate) fn mirror(url: &str) -> Option<PathBuf> {
+    let path = url.strip_prefix("file://")?;
+    path.starts_with('/').then(|| PathBuf::from(path))
 }
 
 fn of_disk(url: &str, path: &Path) -> Result<Reply, Fault> {
@@ -225,15 +240,18 @@ fn page_of(folder: &Path) -> io::Result<String> {
     let mut rows = Vec::new();
     for entry in fs::read_dir(folder)? {
         let entry = entry?;
-        let (name, found) = (
-            entry.file_name().to_string_lossy().into_owned(),
-            entry.metadata()?,
-        );
-        if found.is_file() && is_name(&name) {
-            rows.push(format!(
-                "<a href=\"{name}\">{name}</a> 00:00 {}\n",
-                found.len()
-            ));
+        let name = entry.file_name().to_string_lossy().into_owned();
+        // Servers do not list hidden files either.
+        if name.starts_with('.') {
+            continue;
+        }
+        // The reader of the page judges names, and reports a broken link when it follows it.
+        let found = fs::metadata(entry.path());
+        if found.as_ref().is_ok_and(fs::Metadata::is_dir) {
+            rows.push(format!("<a href=\"{name}/\">{name}/</a>\n"));
+        } else {
+            let bytes = found.map_or(0, |found| found.len());
+            rows.push(format!("<a href=\"{name}\">{name}</a> 00:00 {bytes}\n"));
         }
     }
     rows.sort();
@@ -291,8 +309,19 @@ fn redirected(from: &str, uri: &Uri, location: &str) -> Result<String, FetchErro
     }
 }
 
-fn header<'a>(response: &'a Response<ureq::Body>, name: &str) -> Option<&'a str> {
+pub(crate) fn header<'a>(response: &'a Response<ureq::Body>, name: &str) -> Option<&'a str> {
     response.headers().get(name)?.to_str().ok()
+}
+
+/// The fault that a status without a file states.
+pub(crate) fn refused(url: &str, status: u16, wait: Option<Duration>) -> Fault {
+    match status {
+        408 | 429 | 500 | 502 | 503 | 504 => Fault::Passing(format!("HTTP status {status}"), wait),
+        _ => {
+            let url = url.to_owned();
+            FetchError::Status { url, status }.into()
+        }
+    }
 }
 
 fn of_response(url: &str, response: Response<ureq::Body>, ask: Ask<'_>) -> Result<Reply, Fault> {
@@ -303,22 +332,13 @@ fn of_response(url: &str, response: Response<ureq::Body>, ask: Ask<'_>) -> Resul
             let length = header(&response, "content-length").and_then(|text| text.parse().ok());
             (false, length)
         }
-        206 if ask.from > 0 => match header(&response, "content-range").and_then(range_of) {
+        206 if ask.from > 0 => match header(&response, "content-range").and_then(rest_of) {
             Some((first, length)) if first == ask.from => (true, length),
             _ => return Ok(Reply::OtherFile),
         },
         304 if ask.known.is_some() => return Ok(Reply::Unchanged),
         416 if ask.from > 0 => return Ok(Reply::OtherFile),
-        408 | 429 | 500 | 502 | 503 | 504 => {
-            return Err(Fault::Passing(format!("HTTP status {status}"), wait));
-        }
-        _ => {
-            return Err(FetchError::Status {
-                url: url.to_owned(),
-                status,
-            }
-            .into());
-        }
+        _ => return Err(refused(url, status, wait)),
     };
     if header(&response, "content-encoding").is_some_and(|coding| coding != "identity") {
         let problem = "the answer is encoded, although the unencoded file was requested".to_owned();
@@ -349,31 +369,6 @@ fn of_response(url: &str, response: Response<ureq::Body>, ask: Ask<'_>) -> Resul
         meta,
         body: Box::new(response.into_body().into_reader()),
     }))
-}
-
-/// First byte and length of the complete file of `bytes 5-9/10`; the length of `bytes 5-9/*` is unknown.
-fn range_of(text: &str) -> Option<(u64, Option<u64>)> {
-    let (range, length) = text.strip_prefix("bytes ")?.split_once('/')?;
-    let (first, last) = range.split_once('-')?;
-    let (first, last): (u64, u64) = (first.trim().parse().ok()?, last.trim().parse().ok()?);
-    let length = match length.trim() {
-        "*" => None,
-        length => Some(length.parse().ok()?),
-    };
-    // A range that ends before the file is one that was not asked for.
-    length
-        .is_none_or(|length| last + 1 == length)
-        .then_some((first, length))
-}
-
-/// The wait of `Retry-After`: seconds, or a date.
-fn wait_of(text: &str, now: SystemTime) -> Option<Duration> {
-    let text = text.trim();
-    if let Ok(seconds) = text.parse() {
-        return Some(Duration::from_secs(seconds));
-    }
-    let until = chrono::DateTime::parse_from_rfc2822(text).ok()?;
-    SystemTime::from(until).duration_since(now).ok()
 }
 
 #[cfg(test)]
@@ -428,22 +423,5 @@ mod tests {
         for other in ["http://b.gov/z", "ftp://b.gov/z", "file:///etc/passwd", ""] {
             assert!(to("http://127.0.0.1:8/x", other).is_err(), "{other}");
         }
-    }
-
-    #[test]
-    fn ranges_and_waits_are_read() {
-        assert_eq!(range_of("bytes 5-9/10"), Some((5, Some(10))));
-        assert_eq!(range_of("bytes 5-9/*"), Some((5, None)));
-        for bad in ["bytes 5-8/10", "bytes */10", "5-9/10", "bytes 5-9/x"] {
-            assert_eq!(range_of(bad), None, "{bad}");
-        }
-        let now = SystemTime::UNIX_EPOCH + Duration::from_secs(784_111_777 - 5);
-        assert_eq!(wait_of("120", now), Some(Duration::from_mins(2)));
-        assert_eq!(
-            wait_of("Sun, 06 Nov 1994 08:49:37 GMT", now),
-            Some(Duration::from_secs(5))
-        );
-        assert_eq!(wait_of("Sun, 06 Nov 1994 08:49:30 GMT", now), None);
-        assert_eq!(wait_of("soon", now), None);
     }
 }

@@ -64,7 +64,7 @@ pub enum FetchError {
     },
     /// An address that is not fetched from.
     #[error(
-        "{url} is not a permitted address; expected https://, file://, or http:// on this computer"
+        "{url} is not a permitted address; expected https://, file:///, or http:// on this computer"
     )]
     #[cause(Configuration: "correct the address in the table of archives")]
     Address {

@@ -355,7 +355,7 @@ fn is_empty_box(outcome: &Outcome) -> bool {
 }
 
 /// Scheme and host of an address.
-fn host_of(url: &str) -> &str {
+pub(crate) fn host_of(url: &str) -> &str {
     let start = url.find("://").map_or(0, |at| at + 3);
     let end = url[start..].find('/').map_or(url.len(), |at| start + at);
     &url[..end]

@@ -7,6 +7,7 @@
 //! | find the files that times, orbits, images and windows need | [`plan`] |
 //! | transfer them, resumed and verified | [`Filling`] |
 //! | examine a filled folder | [`audit`] |
+//! | read an archive on its server without downloading it | [`remote`] |
 //!
 //! A file is identified by size and hash, never by a date or a similar name. Instants are UTC as indexes state them:
 //! coverage is determined before any leap seconds or clocks are available.
@@ -32,11 +33,13 @@ mod examined;
 mod filling;
 mod folder;
 mod hashed;
+mod headers;
 pub mod index;
 mod outcome;
 mod page;
 mod part;
 pub mod plan;
+pub mod remote;
 mod safe;
 mod state;
 mod table;

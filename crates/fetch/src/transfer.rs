@@ -90,7 +90,7 @@ impl Receiver<'_> {
     /// Waits before another attempt.
     ///
     /// * `failed` – attempts without progress so far
-    fn pause(
+    pub(crate) fn pause(
         &self,
         url: &str,
         problem: String,
@@ -120,10 +120,19 @@ impl Receiver<'_> {
     /// # Errors
     /// [`FetchError`]; [`Stopped`].
     pub(crate) fn text(&self, url: &str, limit: Duration) -> Result<String> {
+        self.text_as(url, limit, false)
+    }
+
+    /// The listing of a folder: as [`text`](Self::text), and one without a recognisable end is not taken for complete.
+    pub(crate) fn page(&self, url: &str, limit: Duration) -> Result<String> {
+        self.text_as(url, limit, true)
+    }
+
+    fn text_as(&self, url: &str, limit: Duration, is_page: bool) -> Result<String> {
         let mut failed = 0;
         loop {
             Stopped::check(self.stop)?;
-            match self.answer(url, limit)? {
+            match self.answer(url, limit, is_page)? {
                 Ok(text) => return Ok(text),
                 Err(Fault::Lasting(failure)) => return Err(failure),
                 Err(Fault::Passing(problem, asked)) => {
@@ -139,6 +148,7 @@ impl Receiver<'_> {
         &self,
         url: &str,
         limit: Duration,
+        is_page: bool,
     ) -> std::result::Result<std::result::Result<String, Fault>, Stopped> {
         let (send, answer) = sync_channel(1);
         let (client, url) = (self.client.clone(), url.to_owned());
@@ -147,7 +157,9 @@ impl Receiver<'_> {
                 limit: Some(limit),
                 ..Ask::default()
             };
-            let text = client.get(&url, ask).and_then(text_of);
+            let text = client
+                .get(&url, ask)
+                .and_then(|reply| text_of(reply, is_page));
             // Nothing waits for it after a stop.
             let _ = send.send(text);
         });
@@ -182,8 +194,7 @@ impl Receiver<'_> {
         let ask = Ask {
             from: if validator.is_some() { from } else { 0 },
             validator: validator.as_deref(),
-            known: None,
-            limit: None,
+            ..Ask::default()
         };
         match self.client.get(wanted.url, ask)? {
             Reply::Body(answer) => self.take(wanted, part, answer),
@@ -282,14 +293,14 @@ impl Receiver<'_> {
 }
 
 /// The complete body of an answer as a text.
-fn text_of(reply: Reply) -> std::result::Result<String, Fault> {
+fn text_of(reply: Reply, is_page: bool) -> std::result::Result<String, Fault> {
     let Reply::Body(answer) = reply else {
         return Err(Fault::Passing(
             "the answer contains no text".to_owned(),
             None,
         ));
     };
-    let mut bytes = Vec::new();
+    let (mut bytes, is_delimited) = (Vec::new(), answer.is_delimited);
     let read = |bytes: &mut Vec<u8>| -> io::Result<usize> {
         answer.body.take(ANSWER_MAX).read_to_end(bytes)
     };
@@ -299,7 +310,13 @@ fn text_of(reply: Reply) -> std::result::Result<String, Fault> {
             Some(length) if count as u64 != length => {
                 format!("the answer has {count} bytes; expected {length}")
             }
-            _ => return Ok(String::from_utf8_lossy(&bytes).into_owned()),
+            _ => {
+                let text = String::from_utf8_lossy(&bytes).into_owned();
+                if !is_page || is_delimited || text.to_ascii_lowercase().contains("</html") {
+                    return Ok(text);
+                }
+                "the listing ends without </html>, and its length is not stated".to_owned()
+            }
         },
     };
     Err(Fault::Passing(problem, None))

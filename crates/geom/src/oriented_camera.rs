@@ -56,6 +56,18 @@ impl<M: ExteriorOrientation> OrientedCamera<M> {
         }
     }
 
+    /// Point where the ray of an image position first meets a sphere, Mars-fixed, metres; `None` where the ray misses it.
+    #[must_use]
+    pub fn on_sphere_m(&self, line: f64, sample: f64, radius_m: f64) -> Option<Vector3<f64>> {
+        let pose = self.orientation.pose(self.line_times.offset_of_line(line));
+        let look = self.detector.look(sample);
+        let direction = pose.mars_to_camera.tr_mul(&look).normalize();
+        let along_m = -pose.position_m.dot(&direction);
+        let square_m2 = radius_m * radius_m - (pose.position_m.norm_squared() - along_m * along_m);
+        (square_m2 >= 0.0 && along_m > 0.0)
+            .then(|| pose.position_m + (along_m - square_m2.sqrt()) * direction)
+    }
+
     /// Whether a position lies in the image, its edges included.
     #[must_use]
     pub fn shows(&self, line: f64, sample: f64) -> bool {

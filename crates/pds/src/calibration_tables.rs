@@ -45,6 +45,10 @@ pub struct ControlRow {
     pub sigma_m: [Option<f64>; 2],
     /// Additional standard deviations of finding the point in the image, where the table has them, metres.
     pub matching_m: [Option<f64>; 2],
+    /// Name of the laser profile, where the table has it.
+    pub profile: Option<String>,
+    /// The part of the standard deviations that all points of the profile share, where the table has it, metres.
+    pub shared_m: [Option<f64>; 2],
 }
 
 /// Reads a table of tie points.
@@ -74,6 +78,9 @@ pub fn read_control(path: &Path) -> Result<Rows<ControlRow>> {
         let sigma = ["sigma_horizontal_m", "sigma_vertical_m"].map(|name| optional(header, name));
         let matching = ["sigma_matching_horizontal_m", "sigma_matching_vertical_m"];
         let matching = matching.map(|name| optional(header, name));
+        let profile = optional(header, "profile");
+        let shared = ["sigma_shared_horizontal_m", "sigma_shared_vertical_m"];
+        let shared = shared.map(|name| optional(header, name));
         Ok(move |row: &csv::StringRecord| {
             let values = numbers(row, &place)?;
             if !(values[0] >= -180.0 && values[0] <= 360.0 && values[1].abs() <= 90.0) {
@@ -95,6 +102,11 @@ pub fn read_control(path: &Path) -> Result<Rows<ControlRow>> {
                 radius_m: values[2],
                 sigma_m: deviations(row, sigma, CONTROL_SIGMA_MAX_M)?,
                 matching_m: deviations(row, matching, CONTROL_SIGMA_MAX_M)?,
+                profile: profile
+                    .and_then(|at| row.get(at))
+                    .filter(|name| !name.is_empty())
+                    .map(str::to_owned),
+                shared_m: deviations(row, shared, CONTROL_SIGMA_MAX_M)?,
             })
         })
     })

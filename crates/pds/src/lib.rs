@@ -32,6 +32,7 @@
 
 pub mod archive;
 pub mod calibration_tables;
+pub mod control_table;
 mod file_size;
 mod hrsc;
 pub mod image_file;

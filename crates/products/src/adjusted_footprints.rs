@@ -3,10 +3,12 @@
 use std::collections::BTreeMap;
 
 use super::{
+    coordinates::degrees,
     light_time, parquet,
     product::{Content, Declaration, Role, Write},
     table::{Column, Table, Unit, column, meanings},
 };
+use areograph_geom::ellipsoid::Spherical;
 use areograph_stages::adjust::{Adjusted, CorrectedPoint, PointKind, RangeResidual};
 
 pub(super) static TABLE: Declaration = Declaration {
@@ -57,6 +59,7 @@ fn shot_columns<'a>() -> Vec<Column<Shot<'a>>> {
         "profile and, after the last colon, row of the footprint in footprints.parquet, counted from 0",
         |shot: &Shot| shot.0.id.clone(),
     )];
+    columns.extend(places());
     for (axis, [initial, adjusted, sigma]) in [
         ["x_m", "adjusted_x_m", "sigma_x_m"],
         ["y_m", "adjusted_y_m", "sigma_y_m"],
@@ -112,6 +115,38 @@ fn shot_columns<'a>() -> Vec<Column<Shot<'a>>> {
         ),
     ]);
     columns
+}
+
+/// Longitudes and latitudes before and after the adjustment.
+fn places<'a>() -> [Column<Shot<'a>>; 4] {
+    let before = |shot: &Shot| Spherical::from_xyz_m(&shot.0.initial.xyz_m);
+    let after = |shot: &Shot| Spherical::from_xyz_m(&shot.0.ground.xyz_m);
+    [
+        column(
+            "longitude_deg",
+            Unit::Degree,
+            "east longitude of the footprint before the adjustment, 0..360 degrees, {frame}",
+            move |shot: &Shot| degrees(before(shot).longitude_rad),
+        ),
+        column(
+            "latitude_deg",
+            Unit::Degree,
+            "{latitude} latitude of the footprint before the adjustment, degrees, {frame}",
+            move |shot: &Shot| degrees(before(shot).latitude.0),
+        ),
+        column(
+            "adjusted_longitude_deg",
+            Unit::Degree,
+            "east longitude of the adjusted footprint, 0..360 degrees, {frame}",
+            move |shot: &Shot| degrees(after(shot).longitude_rad),
+        ),
+        column(
+            "adjusted_latitude_deg",
+            Unit::Degree,
+            "{latitude} latitude of the adjusted footprint, degrees, {frame}",
+            move |shot: &Shot| degrees(after(shot).latitude.0),
+        ),
+    ]
 }
 
 /// Standard deviations in east, north and height: of a footprint, of what its profile shares, and of the rest.

@@ -40,7 +40,7 @@ const BBOX: &str = "bbox";
 const BBOX_PARTS: [&str; 4] = ["xmin", "ymin", "xmax", "ymax"];
 /// Columns that shots are selected by: a search may keep several values of each, so that GIS has them too; and their
 /// positions.
-const ALSO_IN_GIS: [&str; 4] = ["channel", "class", "attitude_flag", GEOMETRY];
+const ALSO_IN_GIS: [&str; 4] = ["channel", "return_class", "attitude_flag", GEOMETRY];
 
 /// Shots that are written together: enough for all threads, few compared with the memory of a search.
 const ROWS_AT_ONCE: usize = 32_768;
@@ -73,8 +73,11 @@ fn table(rows: Vec<Shot<'_>>, format: RowsFormat) -> Table<'_> {
         .without("utc");
     match format {
         RowsFormat::Parquet => table,
-        RowsFormat::Csv => table.for_text(),
-        RowsFormat::GeoJson => table.also_in_gis(&ALSO_IN_GIS).for_gis(),
+        RowsFormat::Csv => table.for_text().with_joined_lists(),
+        RowsFormat::GeoJson => table
+            .also_in_gis(&ALSO_IN_GIS)
+            .for_gis()
+            .with_joined_lists(),
     }
 }
 

@@ -140,6 +140,7 @@ fn row(column: &Meaning) -> String {
         Kind::Flag => "true or false",
         Kind::Time => "time, UTC",
         Kind::Text => "text",
+        Kind::List => "list of texts",
         Kind::Bytes => "bytes",
     };
     format!(

@@ -163,7 +163,7 @@ fn attribute(column: &Meaning) -> Value {
         Kind::Integer => json!({ "type": "integer" }),
         Kind::Flag => json!({ "type": "boolean" }),
         Kind::Time => json!({ "type": "string", "format": "date-time" }),
-        Kind::Text | Kind::Bytes => json!({ "type": "string" }),
+        Kind::Text | Kind::List | Kind::Bytes => json!({ "type": "string" }),
     };
     schema["description"] = json!(Terms::MARS.fill(&column.description));
     if let Some([least, greatest]) = column.limits {

@@ -212,6 +212,7 @@ fn isd<'a>(site: &SiteProducts<'a>, view: &View<'a>) -> Isd<'a> {
             calibration: &of.calibration,
             camera: &of.camera,
             verdict: if of.valid { VALID } else { "invalid" },
+            is_of_other_orbit: of.is_of_other_orbit,
         }),
     }
 }

@@ -21,6 +21,7 @@ mod adjustment;
 mod archive;
 mod calibration;
 mod campaign;
+mod control_points;
 mod coordinates;
 mod correlations;
 pub mod error;
@@ -75,7 +76,10 @@ pub use adjustment::ADJUSTMENT;
 pub use archive::{
     ArchiveProducts, WorstProfile, profile_name, write_archive_products, write_profile_shots,
 };
-pub use calibration::{CalibrationModel, CalibrationProducts, write_calibration_products};
+pub use calibration::{
+    CalibrationModel, CalibrationProducts, PublishedCalibration, PublishedLine,
+    write_calibration_products,
+};
 pub use campaign::{
     CAMPAIGN_PAGE, CampaignProducts, CampaignTable, is_campaign, read_campaign_tables,
     write_campaign_products,

@@ -11,11 +11,12 @@ use ::parquet::{
 };
 use arrow_array::{
     Array as _, ArrayRef, BooleanArray, Float64Array, GenericByteArray, Int32Array, RecordBatch,
-    TimestampMicrosecondArray, UInt32Array,
+    StringArray, TimestampMicrosecondArray, UInt32Array,
+    builder::{ListBuilder, StringBuilder},
     cast::AsArray as _,
     types::{ByteArrayType, Float64Type},
 };
-use arrow_schema::{DataType, Field, Schema, SchemaRef, TimeUnit};
+use arrow_schema::{DataType, Field, FieldRef, Schema, SchemaRef, TimeUnit};
 use rayon::prelude::*;
 
 use super::{
@@ -81,7 +82,13 @@ fn digest(array: &ArrayRef) -> blake3::Hash {
             hasher.update(&values.map(u8::from).collect::<Vec<u8>>());
         }
         DataType::Utf8 => update_pieces(&mut hasher, array.as_string::<i32>()),
-        DataType::Binary => update_pieces(&mut hasher, array.as_binary::<i32>()),
+        DataType::List(_) => {
+            let lists = array.as_list::<i32>();
+            let lengths = lists.offsets().windows(2);
+            let lengths = lengths.flat_map(|of| (of[1] - of[0]).to_le_bytes());
+            hasher.update(&lengths.collect::<Vec<u8>>());
+            update_pieces(&mut hasher, lists.values().as_string::<i32>());
+        }
         _ => {
             for buffer in array.to_data().buffers() {
                 hasher.update(buffer.as_slice());
@@ -129,6 +136,7 @@ fn field(column: &Meaning) -> Field {
         Kind::Flag => DataType::Boolean,
         Kind::Time => DataType::Timestamp(TimeUnit::Microsecond, Some(UTC.into())),
         Kind::Text => DataType::Utf8,
+        Kind::List => DataType::List(element()),
         Kind::Bytes => DataType::Binary,
     };
     let description = (
@@ -151,10 +159,30 @@ pub(super) fn record_batch(
     schema: &SchemaRef,
     rows: Range<usize>,
 ) -> std::result::Result<RecordBatch, ProductError> {
-    let values = table.values(rows)?.into_par_iter();
-    let arrays = values.map(array).collect();
+    let kinds: Vec<Kind> = table.columns().map(|column| column.kind).collect();
+    let values = table.values(rows)?.into_par_iter().zip(kinds);
+    let arrays = values.map(|(values, kind)| match values {
+        Values::Text(texts) if kind == Kind::List => lists(&texts),
+        values => array(values),
+    });
+    let arrays = arrays.collect();
     RecordBatch::try_new(Arc::clone(schema), arrays)
         .map_err(ProductError::refused("assemble columns"))
+}
+
+/// The parts of lists, named as in the Parquet format.
+fn element() -> FieldRef {
+    Arc::new(Field::new("element", DataType::Utf8, false))
+}
+
+/// Lists of texts that were joined by semicolons.
+fn lists(joined: &StringArray) -> ArrayRef {
+    let mut lists = ListBuilder::new(StringBuilder::new()).with_field(element());
+    for texts in joined.iter().flatten() {
+        let parts = texts.split(';').filter(|part| !part.is_empty());
+        lists.append_value(parts.map(Some));
+    }
+    Arc::new(lists.finish())
 }
 
 fn array(values: Values) -> ArrayRef {
@@ -299,12 +327,18 @@ mod tests {
                 column("geometry", Unit::None, "", move |row: &(i32, bool)| {
                     [row.0.to_le_bytes()[0], u8::from(row.1 && column_at == 4)]
                 }),
+                column("windows", Unit::None, "", move |row: &(i32, bool)| {
+                    let texts = ["a", "", "a;b"][(row.0.unsigned_abs() as usize + 2) % 3];
+                    let is_spoilt = row.1 && column_at == 5;
+                    texts.replace("a;b", if is_spoilt { "ab" } else { "a;b" })
+                })
+                .listed(),
             ];
             Table::of(columns, 5 * ROWS_AT_ONCE + 3, of)
         };
         let path_long = folder.path().join("long.parquet");
         write(&path_long, &long(usize::MAX, 0), Vec::new()).unwrap();
-        for (column_at, name) in ["count", "class", "flag", "utc", "geometry"]
+        for (column_at, name) in ["count", "class", "flag", "utc", "geometry", "windows"]
             .iter()
             .enumerate()
         {

@@ -92,7 +92,7 @@ const fn data_type(kind: Kind) -> Option<&'static str> {
         Kind::Natural | Kind::Integer => "ASCII_Integer",
         Kind::Flag => "ASCII_Boolean",
         Kind::Time => "ASCII_Date_Time_YMD_UTC",
-        Kind::Text => "UTF8_String",
+        Kind::Text | Kind::List => "UTF8_String",
         Kind::Bytes => return None,
     })
 }

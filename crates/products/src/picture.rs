@@ -1,5 +1,6 @@
 //! Pictures of one band, 8 or 16 bits, written line by line: PNG, and TIFF with tiles and overviews.
 
+mod georeference;
 mod png_lines;
 mod tiff_tiles;
 
@@ -9,6 +10,7 @@ use tiff::{decoder::Decoder, tags::Tag};
 
 use self::{png_lines::PngLines, tiff_tiles::TiffTiles};
 use areograph_base::error::{Cause, IoError, Kind, Locate as _, Result};
+use areograph_pds::control_table::ImageControl;
 use areograph_store::files::{Mark, MarkAt, StagedFile};
 
 /// Format of a picture.
@@ -46,7 +48,7 @@ fn is_own_tiff(path: &Path) -> bool {
 }
 
 /// Size and contents of a picture.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct PictureHead {
     /// Samples of a line.
     pub width: u32,
@@ -56,6 +58,8 @@ pub struct PictureHead {
     pub is_deep: bool,
     /// Descriptions, one `name: text` each; the program is described by itself.
     pub notes: Vec<(&'static str, String)>,
+    /// Ground control points, which only a TIFF holds.
+    pub control: Option<ImageControl>,
 }
 
 impl PictureHead {

@@ -310,6 +310,12 @@ fn shot<'a>() -> Vec<Column<Row<'a>>> {
         )
         .between(1, 20),
         column(
+            "return_class",
+            Unit::None,
+            "class of the return: 1 ground, 0 cloud or noise",
+            |row: &Row| i32::from(row.site.footprints.class.at(row.footprint)),
+        ),
+        column(
             "footprint_row",
             Unit::None,
             "row of the footprint in footprints.parquet, counted from 0",
@@ -366,19 +372,18 @@ fn ground<'a>() -> Vec<Column<Row<'a>>> {
 /// Place in the image.
 fn image<'a>() -> Vec<Column<Row<'a>>> {
     type Of = fn(Place) -> Option<f64>;
-    let ours = "line or sample in the image, 0 at the outer edge of the first line or sample, 0.5 at its centre";
     let of: [([&'static str; 2], Unit, Of, &'static str); 4] = [
         (
             ["before_line", "adjusted_line"],
             Unit::Line,
             |of| Some(of.line),
-            ours,
+            "image line, 0 at the outer edge of the first line, 0.5 at its centre",
         ),
         (
             ["before_sample", "adjusted_sample"],
             Unit::Pixel,
             |of| Some(of.sample),
-            ours,
+            "image sample, 0 at the outer edge of the first sample, 0.5 at its centre",
         ),
         (
             ["before_isis_line", "adjusted_isis_line"],

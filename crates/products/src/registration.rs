@@ -66,8 +66,10 @@ pub(super) const ISIS_LINE: &str = "line in ISIS (qview, campt), 1 at the centre
                                     pointing bias of the site; after it, with the kernels and the bias of \
                                     exchange/centre; missing outside the file";
 /// Meaning of a sample of ISIS.
-pub(super) const ISIS_SAMPLE: &str = "sample in ISIS, 1 at the centre of the first sample, with the same kernels as \
-                                      the line in ISIS";
+pub(super) const ISIS_SAMPLE: &str = "sample in ISIS (qview, campt), 1 at the centre of the first sample; before the \
+                                      adjustment, with the original kernels (or support data) and the pointing bias of \
+                                      the site; after it, with the kernels and the bias of exchange/centre; missing \
+                                      outside the file";
 
 /// A line or sample of ISIS, if there is one.
 pub(super) fn isis(place: f64) -> Option<f64> {

@@ -1,7 +1,7 @@
 //! All products of sites, in the order in which they are written.
 
 use super::{
-    adjusted_footprints, adjusted_kernels, adjustment, correlations,
+    adjusted_footprints, adjusted_kernels, adjustment, control_points, correlations,
     exchange::{adjusted, geopackage, jigsaw, matched, qgis, readme, shapefile, stac, tables},
     figures, footprints, heights, isd, kernel_report, orientation, overlays, page, page_data,
     product::Declaration,
@@ -24,6 +24,7 @@ static FIRST: &[&Declaration] = &[
     &orientation::DOCUMENT,
     &isd::ISD,
     &isd::CENTRE,
+    &control_points::TABLE,
     &overlays::PICTURE,
     &overlays::MARKS,
     &ties::TABLE,

@@ -398,6 +398,15 @@ fn values_of(name: &str, array: &ArrayRef) -> Result<Values> {
                 texts.map(Option::unwrap_or_default),
             ))
         }
+        // As in tables: identifiers of windows.
+        DataType::List(item) if is_whole && *item.data_type() == DataType::Utf8 => {
+            let lists = array.as_list::<i32>().iter().flatten();
+            let joined = lists.map(|list| {
+                let texts: Vec<&str> = list.as_string::<i32>().iter().flatten().collect();
+                texts.join(";")
+            });
+            Values::Text(StringArray::from_iter_values(joined))
+        }
         other => {
             let (name, holds) = (name.to_owned(), other.to_string());
             return Err(RowsError::Column { name, holds }.into());

@@ -15,8 +15,7 @@ use areograph_base::{terms::Terms, utc::Utc};
 
 /// Rows whose values are in memory at once.
 pub(super) const ROWS_AT_ONCE: usize = 65_536;
-/// Rows that a thread converts into text at once, and number of such tasks in a wave: the text of a wave, 3 MB per
-/// thread, is kept in memory.
+/// Rows that a thread converts into text at once, and tasks of a wave, whose text, 3 MB a thread, is in memory.
 pub(super) const ROWS_OF_A_TASK: usize = 2_048;
 const TASKS_OF_A_THREAD: usize = 4;
 
@@ -66,6 +65,8 @@ pub(super) enum Kind {
     /// An instant of UTC.
     Time,
     Text,
+    /// Texts, joined by semicolons except in Parquet.
+    List,
     /// Only Parquet has such columns.
     Bytes,
 }
@@ -350,7 +351,7 @@ impl<'a> Table<'a> {
     /// With only the fields of dBASE, numbers first.
     pub(super) fn for_dbase(mut self) -> Self {
         self.columns
-            .sort_by_key(|(_, column)| matches!(column.kind, Kind::Text | Kind::Time));
+            .sort_by_key(|(_, column)| matches!(column.kind, Kind::Text | Kind::List | Kind::Time));
         self.keep(|column| column.dbase.is_some())
     }
 
@@ -444,5 +445,6 @@ pub(super) fn meanings<R>(columns: &[Column<R>]) -> Vec<Meaning> {
         .collect()
 }
 
+mod lists;
 #[cfg(test)]
 pub(super) mod tests;

@@ -45,4 +45,12 @@ mod _native {
     /// A pause longer than this starts another profile of the same orbit, seconds.
     #[pymodule_export]
     const PROFILE_PAUSE_S: f64 = areograph::stages::group_profiles::Profile::PAUSE_S;
+
+    /// Stand-ins of files on servers are read as files are.
+    #[pymodule_init]
+    #[allow(clippy::unnecessary_wraps, reason = "the signature is that of PyO3")]
+    fn init(_module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {
+        areograph::fetch::remote::read_stand_ins();
+        Ok(())
+    }
 }

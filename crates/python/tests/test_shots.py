@@ -64,7 +64,7 @@ def test_every_shot_of_a_record_is_read(mission: Mission) -> None:
 def test_a_polygon_holds_the_shots_that_shapely_finds(mission: Mission, tmp_path: Path) -> None:
     polygon = shapely.Polygon([(175.1, -15.6), (175.9, -15.2), (175.6, -13.4), (175.2, -13.6)])
     everywhere = ag.read_pedr(mission.pedr).to_pandas()
-    ground = everywhere[(everywhere["class"] == 1) & everywhere["attitude_flag"].isin([0, 1])]
+    ground = everywhere[(everywhere.return_class == 1) & everywhere["attitude_flag"].isin([0, 1])]
     inside = shapely.contains_xy(polygon, ground["longitude_deg"], ground["latitude_deg"])
     assert inside.sum() > 100
     file = tmp_path / "polygon.geojson"
@@ -88,8 +88,8 @@ def test_times_and_classes_select(mission: Mission) -> None:
     # The text has milliseconds; shots are 0.1 s apart.
     assert abs(len(by_utc) - len(late)) <= 1
     orbit = int(found["orbit"].iloc[0])
-    table = ag.read_pedr(mission.pedr, orbits=[orbit], columns=["shot", "class"])
-    assert table.column_names == ["shot", "class"]
+    table = ag.read_pedr(mission.pedr, orbits=[orbit], columns=["shot", "return_class"])
+    assert table.column_names == ["shot", "return_class"]
     assert table.num_rows > int((found["orbit"] == orbit).sum())
 
 

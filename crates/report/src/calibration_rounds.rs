@@ -1,7 +1,9 @@
-//! The rounds of a calibration from pixels: a table and a figure.
+//! The rounds of a calibration from pixels: tables and figures.
 
 use super::{
+    elevation_curves,
     html::{Cell, Column, Markup, Table, html, link},
+    laser_match::similarity,
     numbers::signed,
     plots::{Panel, Plot, Series, figure, label},
 };
@@ -27,9 +29,19 @@ pub(super) fn rounds(
         label(of.cell_m, 0),
         of.rounds_max
     );
-    Ok(
-        html! { p { (words) } (numbers(of)) (angles(of, cameras)) (plot(of)?) (model.map(concordances).unwrap_or_default()) },
-    )
+    Ok(html! {
+        p { (words) }
+        (numbers(of))
+        (angles(of, cameras))
+        (plot(of)?)
+        @if let Some(model) = model {
+            (concordances(model))
+            h3 { "Elevation curves" }
+            (elevation_curves::of_rounds(model.first, model.last)?)
+            h3 { "Similarity" }
+            (similarity::pictures(model.last)?)
+        }
+    })
 }
 
 /// Number of units in the table of concordances.

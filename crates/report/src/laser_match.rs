@@ -1,11 +1,13 @@
-//! The page of a match of laser profiles with a terrain model: verdict, map of the shifts, withheld shots, every unit
+//! The page of a match of laser profiles with a terrain model: verdict, map of the shifts, withheld shots, elevation curves, every unit
 //! and its similarities.
 
-mod similarity;
+pub(super) mod similarity;
 
 use super::{
-    checks,
-    html::{Cell, Column, Markup, Section, Table, Tone, counted, html, list, page, verdict},
+    checks, elevation_curves,
+    html::{
+        Cell, Column, Markup, Section, Table, Tone, counted, folded, html, list, page, verdict,
+    },
     numbers::signed,
     plots::{Arrow, Arrows, GREY, Panel, Plot, Series, figure, label, magnification},
 };
@@ -23,6 +25,7 @@ pub fn match_page(of: &LaserMatch) -> Result<String> {
     let sections = [
         Section::new("Shifts", map(of)?),
         Section::new("Withheld shots", held_out(of)?),
+        Section::new("Elevation curves", elevation_curves::of_match(of)?),
         Section::new("Units", units(of)),
         Section::new("Similarity", similarity::pictures(of)?),
         Section::new("Left out", list(&of.complaints)),
@@ -221,5 +224,8 @@ fn units(of: &LaserMatch) -> Markup {
             ],
         );
     }
-    table.finish()
+    folded(
+        &format!("Table of {}", counted(of.units.len(), "unit")),
+        &table.finish(),
+    )
 }

@@ -2,7 +2,7 @@
 
 use super::{
     grey::{grey, stretched},
-    html::{Cell, Column, Markup, Table, html, link, paragraph},
+    html::{Cell, Column, Markup, Table, folded, html, link, paragraph},
     numbers::{signed, whole},
     overlays::picture_of,
     plots::label,
@@ -128,8 +128,10 @@ pub(super) fn mosaic(made: Option<&PicturesOnMap>) -> Result<Markup> {
             (link("../mosaic.tif", "mosaic.tif")) ", " (link("../mosaic_source.tif", "mosaic_source.tif")) ", "
             (link("../mosaic.json", "mosaic.json")) "."
         }
-        div.pieces { div { (picture) p { "Mosaic, north up" } } }
-        (pictures.finish())
-        @if !made.offsets.is_empty() { (pairs.finish()) }
+        div.pieces.one { div { (picture) p { "Mosaic, north up" } } }
+        (folded("Pictures of the mosaic, and offsets between them", &html! {
+            (pictures.finish())
+            @if !made.offsets.is_empty() { (pairs.finish()) }
+        }))
     })
 }

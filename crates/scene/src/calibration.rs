@@ -72,7 +72,7 @@ pub(super) fn drawn_offset(seed: u64, line: &str, angles_deg: [f64; 3]) -> Offse
 fn orbits() -> [Orbit; 2] {
     [
         Orbit {
-            name: "i864",
+            name: "i864".to_owned(),
             start_et_s: 596_764_800.0,
             longitude_deg: -63.13,
             latitude_deg: -33.0,
@@ -84,7 +84,7 @@ fn orbits() -> [Orbit; 2] {
             },
         },
         Orbit {
-            name: "i818",
+            name: "i818".to_owned(),
             start_et_s: 595_641_600.0,
             longitude_deg: -45.31,
             latitude_deg: -30.0,
@@ -100,16 +100,16 @@ fn orbits() -> [Orbit; 2] {
 
 /// The file of true values.
 #[derive(Serialize)]
-struct Truth {
+struct Truth<'a> {
     seed: u64,
     /// φ, ω and κ of every line, degrees.
     angles_deg: BTreeMap<&'static str, [f64; 3]>,
     /// Bias of every orbit, true minus support data, Mars-fixed metres.
-    orbit_bias_m: BTreeMap<&'static str, [f64; 3]>,
+    orbit_bias_m: BTreeMap<&'a str, [f64; 3]>,
     /// Its drift, metres a line.
-    orbit_drift_m_per_line: BTreeMap<&'static str, [f64; 3]>,
+    orbit_drift_m_per_line: BTreeMap<&'a str, [f64; 3]>,
     /// True positions of the points of every orbit, Mars-fixed metres.
-    points_m: BTreeMap<&'static str, BTreeMap<String, [f64; 3]>>,
+    points_m: BTreeMap<&'a str, BTreeMap<String, [f64; 3]>>,
 }
 
 /// Tables of an orbit, and the true positions of its points.
@@ -138,9 +138,12 @@ pub fn write_calibration_scene(directory: &Path, seed: u64) -> Result<String> {
                 (line.name, angles.map(f64::to_degrees))
             })
             .collect(),
-        orbit_bias_m: orbits.iter().map(|of| (of.name, of.error.bias_m)).collect(),
+        orbit_bias_m: orbits
+            .iter()
+            .map(|of| (&*of.name, of.error.bias_m))
+            .collect(),
         orbit_drift_m_per_line: (orbits.iter())
-            .map(|of| (of.name, of.error.drift_m_per_line))
+            .map(|of| (&*of.name, of.error.drift_m_per_line))
             .collect(),
         points_m: BTreeMap::new(),
     };
@@ -154,7 +157,7 @@ pub fn write_calibration_scene(directory: &Path, seed: u64) -> Result<String> {
             let path = draft.root().join(format!("{}_{kind}.csv", orbit.name));
             put(&path, text).in_file(&path)?;
         }
-        truth.points_m.insert(orbit.name, tables.points_m);
+        truth.points_m.insert(&orbit.name, tables.points_m);
     }
     let truth = serde_json::to_string_pretty(&truth).unwrap_or_default() + "\n";
     for (name, text) in [("truth.json", &*truth), ("calibration.toml", CALIBRATION)] {
@@ -217,7 +220,7 @@ fn laser(place_m: &Vector3<f64>, random: &mut Random) -> Vector3<f64> {
 }
 
 /// Longitude and latitude in degrees, radius in metres.
-fn degrees(place_m: &Vector3<f64>) -> String {
+pub(super) fn degrees(place_m: &Vector3<f64>) -> String {
     let radius_m = place_m.norm();
     format!(
         "{:.9},{:.9},{radius_m:.4}",

@@ -128,7 +128,7 @@ fn lines(scene: &LineScene) -> [StereoLine; 3] {
 fn orbit(scene: &LineScene) -> Orbit {
     let wrong = if scene.is_wrong { 1.0 } else { 0.0 };
     Orbit {
-        name: "i864",
+        name: "i864".to_owned(),
         start_et_s: 596_764_800.0,
         longitude_deg: LONGITUDE_DEG,
         latitude_deg: LATITUDE_DEG,

@@ -41,6 +41,7 @@ mod archive_frames;
 mod attitude;
 mod calibration;
 mod calibration_loop;
+mod calibration_orbits;
 mod campaign;
 mod context;
 mod drawn;
@@ -85,6 +86,7 @@ pub use along::write_scene_along;
 pub use archive::{ArchiveOptions, ArchiveSummary, write_archive};
 pub use calibration::write_calibration_scene;
 pub use calibration_loop::{LineScene, write_calibration_loop_scene, write_line_scene};
+pub use calibration_orbits::{OrbitsScene, write_calibration_orbits};
 pub use campaign::{CampaignOptions, CampaignSummary, write_campaign};
 pub use error::SceneError;
 pub use error_sources::{
@@ -107,17 +109,20 @@ pub struct SceneOptions {
     pub day_s: f64,
     /// Further laser passes over each site of narrow-angle images, on days without an image.
     pub passes: u32,
+    /// Whether each site also has tie points at laser shots, as matching by areograph measures them.
+    pub ties_at_shots: bool,
     /// Errors of the data, and the relief.
     pub errors: SceneErrors,
 }
 
 impl Default for SceneOptions {
-    /// Seed 1, days of 24 h, no further passes, errors of the worked example.
+    /// Seed 1, days of 24 h, no further passes, no tie points at shots, errors of the worked example.
     fn default() -> Self {
         Self {
             seed: 1,
             day_s: areograph_base::units::SECONDS_PER_DAY,
             passes: 0,
+            ties_at_shots: false,
             errors: SceneErrors::demo(),
         }
     }

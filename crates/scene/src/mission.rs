@@ -20,6 +20,7 @@ use super::{
     orbit::Orbit,
     pedr::{PedrRequest, frame_tags, write_pedr},
     plan::{IMAGES, LOST_IMAGE, SITES, Site},
+    profile_shift::ProfileShift,
     sites::{README, planned_label, planned_site},
     terrain::Terrain,
     ties::{TieNoise, ties_name, write_ties},
@@ -112,10 +113,12 @@ pub(super) fn write(
     let mut truth = Truth::new(options.seed, &options.errors);
     let pedr = draft.folder("pedr")?;
     let mut kept = Vec::new();
+    let mut recorded_m: Vec<Recorded<'_>> = Vec::new();
     for flown in &days {
         let day = write_day(&pedr, flown, &terrain, options)?;
         truth.files.push(day.file);
         kept.push(day.kept);
+        recorded_m.push(day.recorded);
         if flown.arc.image.is_delivered() {
             let versions = versions(&flown.arc, options.seed);
             truth.images.push(ImageTruth::of(&flown.arc, &versions));
@@ -124,9 +127,10 @@ pub(super) fn write(
         }
     }
     for pass in &passes {
-        let (file, profile) = write_pass(&pedr, pass, &terrain, options)?;
+        let (file, profile, recorded) = write_pass(&pedr, pass, &terrain, options)?;
         truth.files.push(file);
         truth.profiles.push(profile);
+        recorded_m.push(recorded);
     }
     let sites = draft.folder("sites")?;
     let ties = draft.folder("ties")?;
@@ -137,7 +141,17 @@ pub(super) fn write(
             .collect();
         if let [first, second] = own[..] {
             let noise = TieNoise::of(&options.errors);
-            let pair = write_ties(&ties, [first, second], &terrain, noise, options.seed)?;
+            let recorded = recorded_m
+                .iter()
+                .filter(|of| options.ties_at_shots && of.site == site.id);
+            let shots_m: Vec<Vector3<f64>> = recorded.flat_map(|of| &of.shots_m).copied().collect();
+            let pair = write_ties(
+                &ties,
+                [first, second],
+                &terrain,
+                (noise, &shots_m),
+                options.seed,
+            )?;
             let arcs = [&first.arc, &second.arc];
             let has_pixels = images.is_some_and(|(_, sites, _)| is_of(site, sites));
             let passes: Vec<&FurtherPass> = passes
@@ -165,6 +179,24 @@ pub(super) fn write(
 
 fn is_of(site: &Site, sites: &[&Site]) -> bool {
     sites.iter().any(|of| of.id == site.id)
+}
+
+/// Shots of a profile over a site where its file has them, IAU 2000, metres.
+struct Recorded<'a> {
+    site: &'a str,
+    shots_m: Vec<Vector3<f64>>,
+}
+
+impl<'a> Recorded<'a> {
+    fn of(site: &'a str, shift: &ProfileShift, kept: &[KeptShot]) -> Self {
+        let shots = kept
+            .iter()
+            .map(|kept| shift.rotation() * kept.truth.ground_m);
+        Self {
+            site,
+            shots_m: shots.collect(),
+        }
+    }
 }
 
 /// Rejects options that are out of range.
@@ -285,7 +317,7 @@ fn write_pass(
     pass: &FurtherPass,
     terrain: &Terrain,
     options: &SceneOptions,
-) -> Result<(FileTruth, ProfileTruth<'static>)> {
+) -> Result<(FileTruth, ProfileTruth<'static>, Recorded<'static>)> {
     let name = pass.file();
     let request = PedrRequest {
         name: &name,
@@ -306,7 +338,8 @@ fn write_pass(
     profile.orbit_differences =
         orbit_differences(&pass.versions(options.seed), pass.orbit(), &kept);
     profile.profile_shift = Some(pass.shift.clone());
-    Ok((file, profile))
+    let recorded = Recorded::of(pass.site.id, &pass.shift, &kept);
+    Ok((file, profile, recorded))
 }
 
 /// Output of one day.
@@ -314,6 +347,7 @@ struct Day<'a> {
     file: FileTruth,
     /// Over the day's site.
     profile: ProfileTruth<'a>,
+    recorded: Recorded<'a>,
     /// Shots in the window of the wide-angle images.
     kept: Vec<KeptShot>,
 }
@@ -377,6 +411,7 @@ fn write_day<'a>(
     Ok(Day {
         file,
         profile,
+        recorded: Recorded::of(image.site.id, &flown.errors.profile_shift, &kept),
         kept: context,
     })
 }

@@ -60,7 +60,7 @@ impl OrbitError {
 
 /// An orbit over one stretch of ground.
 pub(super) struct Orbit {
-    pub(super) name: &'static str,
+    pub(super) name: String,
     /// Time of the pass over the middle of the stretch, ET seconds.
     pub(super) start_et_s: f64,
     /// East longitude and latitude of the middle.
@@ -89,6 +89,11 @@ impl StereoLine {
         let (sin, cos) = self.pitch_deg.to_radians().sin_cos();
         let (y, z) = (Vector3::x(), Vector3::new(0.0, sin, cos));
         Matrix3::from_rows(&[y.cross(&z).transpose(), y.transpose(), z.transpose()])
+    }
+
+    /// Tangent of a pixel.
+    pub(super) fn pixel() -> f64 {
+        PIXEL_MM / FOCAL_MM
     }
 
     /// The true line, with `samples` samples.

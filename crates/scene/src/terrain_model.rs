@@ -189,7 +189,7 @@ fn support_data(name: &'static str, pitch_deg: f64) -> String {
         errors: [0.0; 3],
     };
     let orbit = pushbroom_pair::Orbit {
-        name: "model",
+        name: "model".to_owned(),
         start_et_s: 596_764_800.0,
         longitude_deg: LONGITUDE_RAD / RADIANS_PER_DEGREE,
         latitude_deg: LATITUDE_RAD / RADIANS_PER_DEGREE,

@@ -1,13 +1,15 @@
 //! Tie points of an image pair, measured in images whose true times and positions differ from labels and kernels.
 
+mod noise;
+
 use std::path::Path;
 
 use nalgebra::Vector3;
 
+use self::noise::Waves;
 use super::{
     drawn::Flown,
     error::SceneError,
-    error_sources::SceneErrors,
     files::put,
     random::Random,
     terrain::Terrain,
@@ -27,8 +29,12 @@ use areograph_geom::{
 };
 use areograph_pds::ties::ties_table;
 
+pub(super) use noise::TieNoise;
+
 /// Tie points of a pair, as many as in the paper at Gusev; fewer where the images hardly overlap.
 const TIES: usize = 154;
+/// Tie points of a pair at laser shots, at most.
+const TIES_AT_SHOTS: usize = 320;
 /// Candidate positions of the first image for one tie point.
 const PLACES_PER_TIE: usize = 20;
 /// No tie point is nearer to the edge of an image, pixels: blunders stay inside, plus noise of a pixel.
@@ -282,62 +288,9 @@ fn no_camera(flown: &Flown, error: &dyn std::error::Error) -> SceneError {
     }
 }
 
-/// Noise of tie points.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct TieNoise {
-    /// Standard deviation, lines and samples.
-    sigma_px: f64,
-    /// Share of its variance that neighbours have in common.
-    common: f64,
-}
-
-impl TieNoise {
-    /// Noise of a mission.
-    pub(super) fn of(errors: &SceneErrors) -> Self {
-        Self {
-            sigma_px: errors.tie_noise_factor * errors.tie_noise_px,
-            common: errors.tie_noise_common,
-        }
-    }
-
-    /// The same with another noise, as site files state it, pixels.
-    pub(super) fn stated_as(self, errors: &SceneErrors, stated_px: f64) -> Self {
-        Self {
-            sigma_px: errors.tie_noise_factor * stated_px,
-            ..self
-        }
-    }
-}
-
-/// Errors that neighbouring tie points have in common: waves over an image, of standard deviation 1.
-struct Waves(Vec<[f64; 3]>);
-
-impl Waves {
-    const COUNT: u32 = 12;
-    /// Shortest and longest wave, pixels.
-    const LENGTH_PX: [f64; 2] = [300.0, 3_000.0];
-
-    fn draw(random: &mut Random) -> Self {
-        let waves = (0..Self::COUNT).map(|_| {
-            let [shortest_px, longest_px] = Self::LENGTH_PX;
-            let number = std::f64::consts::TAU / random.between_log(shortest_px, longest_px);
-            let (sin, cos) = random.between(0.0, std::f64::consts::TAU).sin_cos();
-            let phase = random.between(0.0, std::f64::consts::TAU);
-            [number * sin, number * cos, phase]
-        });
-        Self(waves.collect())
-    }
-
-    fn at(&self, line: f64, sample: f64) -> f64 {
-        let waves = self.0.iter();
-        let sum: f64 = waves
-            .map(|[by_line, by_sample, phase]| (by_line * line + by_sample * sample + phase).cos())
-            .sum();
-        sum * (2.0 / f64::from(Self::COUNT)).sqrt()
-    }
-}
-
 /// Writes the tie points of a pair into `folder`, measured with noise.
+///
+/// * `shots_m` – places of laser shots, IAU 2000, metres: those that both images show are tie points as well
 ///
 /// # Errors
 /// [`SceneError::NoCamera`]; errors of writing.
@@ -345,7 +298,7 @@ pub(super) fn write_ties<'a>(
     folder: &Path,
     [first, second]: [&'a Flown<'a>; 2],
     terrain: &Terrain,
-    noise: TieNoise,
+    (noise, shots_m): (TieNoise, &[Vector3<f64>]),
     seed: u64,
 ) -> Result<TiesTruth<'a>> {
     let site = first.arc.image.site.id;
@@ -354,7 +307,8 @@ pub(super) fn write_ties<'a>(
         TrueImage::new(second, terrain)?,
     ];
     let mut random = Random::new(seed, &format!("ties {site}"));
-    let exact = exact_ties(&pair, terrain, &mut random)?;
+    let mut exact = exact_ties(&pair, terrain, &mut random)?;
+    exact.extend(ties_at_shots(&pair, terrain, shots_m)?);
     let (measured, truth) = spoil(exact, noise, &mut random);
     put(&folder.join(ties_name(site)), &ties_table(&measured))?;
     Ok(TiesTruth {
@@ -387,6 +341,28 @@ pub(super) fn exact_ties(
     };
     let places = 0..TIES * PLACES_PER_TIE;
     Ok(places.filter_map(tie).take(TIES).collect())
+}
+
+/// Tie points at some of the places `shots_m` that both images show, evenly selected, measured without error.
+fn ties_at_shots(
+    pair: &[TrueImage<'_>; 2],
+    terrain: &Terrain,
+    shots_m: &[Vector3<f64>],
+) -> Result<Vec<Tie>> {
+    let projectors = [pair[0].projector()?, pair[1].projector()?];
+    let tie = |shot_m: &Vector3<f64>| {
+        let at = pair[0].measure(&projectors[0], shot_m)?;
+        let ground_m = pair[0].ground_m(terrain, at.line, at.sample)?;
+        let first = pair[0].measure(&projectors[0], &ground_m)?;
+        let second = pair[1].measure(&projectors[1], &ground_m)?;
+        Some(Tie {
+            ground_m,
+            measures: [first, second],
+        })
+    };
+    let all: Vec<Tie> = shots_m.iter().filter_map(tie).collect();
+    let step = all.len().div_ceil(TIES_AT_SHOTS).max(1);
+    Ok(all.into_iter().step_by(step).collect())
 }
 
 /// Adds noise to all measurements, and blunders to a few.

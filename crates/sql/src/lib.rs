@@ -12,6 +12,6 @@ mod text;
 
 pub use datafusion;
 
-pub use question::{Question, ask, ask_tables};
+pub use question::{MEMORY_BYTES, Question, TABLE, ask, ask_tables, read_only};
 pub use table::{Columns, ShotsTable, Tally};
 pub use text::{as_table, as_text, as_text_schema};

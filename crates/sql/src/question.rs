@@ -17,9 +17,9 @@ use datafusion::{
 use super::ShotsTable;
 
 /// Memory for sorting and grouping; more goes to temporary files.
-const MEMORY_BYTES: usize = 128 << 20;
+pub const MEMORY_BYTES: usize = 128 << 20;
 /// The name of the table.
-const TABLE: &str = "shots";
+pub const TABLE: &str = "shots";
 
 /// A query that failed.
 #[derive(Debug, thiserror::Error)]
@@ -85,10 +85,15 @@ async fn answer(
     for (name, table) in tables {
         context.register_table(name, table)?;
     }
-    let read_only = SQLOptions::new()
+    let frame = context.sql_with_options(question, read_only()).await?;
+    Ok(frame.execute_stream().await?)
+}
+
+/// Limits queries to those that change nothing.
+#[must_use]
+pub fn read_only() -> SQLOptions {
+    SQLOptions::new()
         .with_allow_ddl(false)
         .with_allow_dml(false)
-        .with_allow_statements(false);
-    let frame = context.sql_with_options(question, read_only).await?;
-    Ok(frame.execute_stream().await?)
+        .with_allow_statements(false)
 }

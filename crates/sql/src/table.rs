@@ -109,6 +109,30 @@ impl ShotsTable {
         }
     }
 
+    /// The shots that may meet these conditions, with these columns; all columns without a projection.
+    #[must_use]
+    pub fn shots(
+        &self,
+        projection: Option<&[usize]>,
+        filters: &[Expr],
+    ) -> Arc<dyn PartitionStream> {
+        let conditions = Conditions::of(filters);
+        let allowed = |source: &&Source| conditions.allow_file(&source.file().name);
+        let columns = match projection {
+            Some(places) => self.columns.pick(places),
+            None => Arc::clone(&self.columns),
+        };
+        Arc::new(Shots {
+            sources: self.sources.iter().filter(allowed).cloned().collect(),
+            regions: conditions.regions(),
+            time: conditions.time(),
+            schema: columns.schema(),
+            columns,
+            tally: Arc::clone(&self.tally),
+            stop: Arc::clone(&self.stop),
+        })
+    }
+
     /// Results, besides rows, of the queries so far.
     #[must_use]
     pub fn tally(&self) -> Arc<Mutex<Tally>> {
@@ -147,22 +171,8 @@ impl TableProvider for ShotsTable {
         filters: &[Expr],
         limit: Option<usize>,
     ) -> Answer<Arc<dyn ExecutionPlan>> {
-        let conditions = Conditions::of(filters);
-        let allowed = |source: &&Source| conditions.allow_file(&source.file().name);
-        let columns = match projection {
-            Some(places) => self.columns.pick(places),
-            None => Arc::clone(&self.columns),
-        };
-        let schema = columns.schema();
-        let shots: Arc<dyn PartitionStream> = Arc::new(Shots {
-            sources: self.sources.iter().filter(allowed).cloned().collect(),
-            regions: conditions.regions(),
-            time: conditions.time(),
-            schema: SchemaRef::clone(&schema),
-            columns,
-            tally: Arc::clone(&self.tally),
-            stop: Arc::clone(&self.stop),
-        });
+        let shots = self.shots(projection.map(Vec::as_slice), filters);
+        let schema = SchemaRef::clone(shots.schema());
         let plan = StreamingTableExec::try_new(schema, vec![shots], None, [], false, limit)?;
         Ok(Arc::new(plan))
     }

@@ -23,9 +23,7 @@ use areograph_base::{
 use areograph_config::MolaSurfaceConfig;
 use areograph_geom::{
     statistics::Summary,
-    surface::{
-        Crossover, LeftOut, ProfilePriors, SurfaceOptions, Withheld, WithheldScore, withheld,
-    },
+    surface::{Crossover, LeftOut, SurfaceOptions, Withheld, WithheldScore, withheld},
 };
 use areograph_store::{
     stage::{Output, Stage},
@@ -218,13 +216,11 @@ fn described(
     options: &SurfaceOptions,
 ) -> ProfileCheck {
     let id = |profile: usize| profiles[profile].id.clone();
-    let priors = ProfilePriors {
-        radial_sigma_m: options.profile_sigma_m,
-        plan_sigma_m: options.profile_plan_sigma_m,
-    };
     let belonging = net.belonging(crossovers);
     let differences_m: Vec<f64> = belonging.iter().map(|of| of.difference_m).collect();
-    let shifts = net.shifts(crossovers, &priors).into_iter();
+    let shifts = net
+        .shifts(crossovers, options.profile_plan_sigma_m)
+        .into_iter();
     let left_out = net.left_out.iter().map(|of: &LeftOut| LeftOutProfile {
         profile: id(of.profile),
         crossovers: of.crossovers,

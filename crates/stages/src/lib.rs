@@ -20,6 +20,7 @@ pub mod convert_datum;
 pub mod describe_kernels;
 pub mod fit_sensor_model;
 pub mod group_profiles;
+pub mod interpolate_shots;
 pub mod intersect;
 pub mod join_surfaces;
 pub mod judge;
@@ -45,9 +46,10 @@ pub mod tag_times;
 pub mod tag_utc;
 pub mod triangulate;
 
-use shared::{calibrated_camera, ground, image_view, raster, shot_heights, turn};
+use shared::{calibrated_camera, ground, image_view, raster, turn};
 pub use shared::{
-    camera_lines, image_pixels, line_camera, look, mola_surface, orientation, oriented, site_image,
+    camera_lines, image_pixels, line_camera, look, mola_surface, orientation, oriented,
+    shot_heights, site_image,
 };
 #[cfg(test)]
 use shared::{invented_orthoimage, invented_pair};

@@ -6,6 +6,7 @@ mod outputs;
 mod own;
 mod partial;
 mod staged;
+pub mod stand_in;
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -23,6 +24,7 @@ pub use self::outputs::{overlap, real_path, require_apart};
 pub use self::own::{Mark, MarkAt, require_own};
 pub use self::partial::{ASIDE, PartialFolder, TEMPORARY, remove_abandoned};
 pub use self::staged::StagedFile;
+use self::stand_in::StandIn;
 use areograph_base::{
     error::{Cause, IoError, Locate, Result},
     watch::Watch,
@@ -313,6 +315,23 @@ impl SeenFile {
         let begun = SystemTime::now();
         let file = open(path)?;
         let identity = identity_of(&file).in_file(path)?;
+        let stand_in = if start == 0 {
+            StandIn::of_open(&file).in_file(path)?
+        } else {
+            None
+        };
+        if let Some(file) = stand_in {
+            // The file for which it stands is the input; it is never known by the identity of its stand-in.
+            return Ok(Self {
+                identity,
+                file: HashedFile {
+                    path: path.to_owned(),
+                    bytes: file.bytes(),
+                    blake3: file.blake3(),
+                },
+                read_s: None,
+            });
+        }
         let (blake3, bytes) = hash_open(&file, start).in_file(path)?;
         let steady = identity.is_steady(begun) && identity_of(&file).in_file(path)? == identity;
         let read_s = begun.duration_since(UNIX_EPOCH).ok().filter(|_| steady);

@@ -16,7 +16,8 @@ use crate::{
     schema::DocumentSchema,
     stage::Round,
     stages::{
-        compare_orthoimages::OrthoimageOffsets, map_surface::Surface, rectify_images::Orthoimage,
+        compare_orthoimages::OrthoimageOffsets,
+        rectify_images::{GroundModel, Orthoimage},
     },
 };
 
@@ -26,7 +27,7 @@ const SITES: &str = "a site with orthoimages";
 
 pub(super) static ORTHOIMAGE: Declaration = Declaration {
     path: "images/<image>/orthoimage.tif",
-    what: "orthoimage on the equirectangular map of surface_above_sphere.tif (cloud-optimised GeoTIFF): brightness 1 to 255 (pixel value 0 is \
+    what: "orthoimage on an equirectangular map, that of surface_above_sphere.tif where there is one (cloud-optimised GeoTIFF): brightness 1 to 255 (pixel value 0 is \
            stored as 1), or 0 in cells that have no height, are hidden by relief or lack pixels",
     readers: "GIS",
     rows: "cells with a brightness",
@@ -65,7 +66,7 @@ pub(super) static BEFORE: Declaration = Declaration {
 pub(super) static SIGMAS: Declaration = Declaration {
     path: "images/<image>/orthoimage_sigma.tif",
     what: "standard deviation of horizontal positions in the orthoimage (both axes together, without the shared error), metres, \
-           on the cells of surface_above_sphere.tif: due to height errors, jitter and drift; orthoimages.json states the shared error",
+           on the cells of the terrain model or of the ground between shots: due to height errors, jitter and drift; orthoimages.json states the shared error",
     readers: "GIS",
     rows: "cells that the image shows",
     role: Role::Data,
@@ -78,9 +79,9 @@ pub(super) static SIGMAS: Declaration = Declaration {
                 what: "standard deviation of the horizontal position",
                 unit: "m",
             };
-            let terrain = of.site.find::<Surface>()?;
-            let made = orthoimage(of.site, image)?.zip(terrain);
-            made.map_or(Ok(0), |(image, Surface { model, .. })| {
+            let ground = GroundModel::of(of.site.book)?;
+            let made = orthoimage(of.site, image)?.zip(ground);
+            made.map_or(Ok(0), |(image, model)| {
                 let numbers = (band, &*image.sigmas_m);
                 write_map(path, of, &model.heights, numbers, model.parallel_rad)
             })
@@ -330,11 +331,12 @@ struct Entry<'a> {
     /// no scatter was measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     jitter_m: Option<f64>,
-    /// Standard deviation due to drift (orientation errors that change along the image), both axes together; omitted without
-    /// an adjustment.
+    /// Standard deviation due to drift (orientation errors that change along the image), both axes together: by the adjustment, or by
+    /// the usual errors of kernels.
     #[serde(skip_serializing_if = "Option::is_none")]
     drift_m: Option<f64>,
-    /// Standard deviations of the shared error, east and north; omitted without an adjustment with heights.
+    /// Standard deviations of the shared error, east and north: of all images by the adjustment, or of this image by the usual errors
+    /// of kernels; omitted for an adjustment without heights.
     #[serde(skip_serializing_if = "Option::is_none")]
     shared_sigma_m: Option<[f64; 2]>,
 }

@@ -13,7 +13,10 @@ use crate::{
         Section,
         parts::{Cell, Column, Table, grey, label, link, picture_of, stretched, whole},
     },
-    stages::rectify_images::{Orthoimage, OrthoimageAccount},
+    stages::{
+        interpolate_shots::ShotModel,
+        rectify_images::{Orthoimage, OrthoimageAccount},
+    },
 };
 
 pub(super) const SECTION: Section = Section {
@@ -26,15 +29,30 @@ pub(super) const SECTION: Section = Section {
 
 fn write(site: &SiteProducts) -> Result<Markup> {
     let orthoimages = orthoimages(site)?;
+    let is_between_shots = site.has::<ShotModel>();
+    let is_adjusted = site.adjustment().is_some();
+    let altimeter = site.config.terms().altimeter;
     Ok(html! {
         (table(site, orthoimages))
         p {
-            "Cells are empty in wide holes of the terrain model, on ground that relief hides from the camera, and where \
-             pixels are missing. σ is the standard deviation of the horizontal position of a cell, both axes together, \
-             without the shared error. Heights in narrow holes are interpolated, which increases σ off nadir. σ contains \
-             height errors, jitter (where the scatter of tie points shows it), and drift (orientation errors that change \
-             along the image). The adjustment states the σ of the shared error on each axis. Images without tie points are \
-             not rectified in an adjusted site."
+            @if is_between_shots {
+                "Heights are those of the ground between the shots of " (altimeter) ", because the site requests no terrain \
+                 model. Cells are empty farther than 3 km from every shot, on ground that relief hides from the camera, and \
+                 where pixels are missing. "
+            } @else {
+                "Cells are empty in wide holes of the terrain model, on ground that relief hides from the camera, and where \
+                 pixels are missing. Heights in narrow holes are interpolated, which increases σ off nadir. "
+            }
+            "σ is the standard deviation of the horizontal position of a cell, both axes together, without the shared error. \
+             It contains height errors, jitter (where the scatter of tie points shows it), and drift (orientation errors that \
+             change along the image). "
+            @if is_adjusted {
+                "The adjustment states the σ of the shared error on each axis. Images without tie points are not rectified in an \
+                 adjusted site."
+            } @else {
+                "Without an adjustment, drift and the σ of the error that a whole image shares follow from the usual errors of \
+                 kernels (adjustment.position_sigma_m and rotation_sigma_arcsec), not those of support data; jitter is not known."
+            }
         }
         (comparison::compared(site)?)
         div.pieces { @for of in orthoimages { (picture(site, &of.account)?) } }
@@ -44,16 +62,16 @@ fn write(site: &SiteProducts) -> Result<Markup> {
 
 fn table(site: &SiteProducts, orthoimages: &[Orthoimage]) -> Markup {
     let mut table = Table::new(
-        "Orthoimages on the terrain model",
+        "Orthoimages",
         &[
             Column::Text("image"),
             Column::Number("cell (m)"),
             Column::Number("pixel (m)"),
             Column::Number("filled cells"),
             Column::Number("cells with missing pixels"),
-            Column::Number("terrain cells in the image"),
-            Column::Number("hidden terrain cells"),
-            Column::Number("interpolated terrain cells"),
+            Column::Number("cells with a height in the image"),
+            Column::Number("hidden cells"),
+            Column::Number("interpolated cells"),
             Column::Number("σ (m)"),
             Column::Number("σ, jitter (m)"),
             Column::Number("σ, drift (m)"),

@@ -5,13 +5,16 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use crate::{
+    body::Body,
     cli::{output, progress::Progress},
     config::all_instruments,
     error::{Cause, Locate as _, Result},
     files::require_apart,
     pds::{
+        control_table::{ImageControl, read_image_control},
         image_file::{ImageFile, LineState, OddEven, Radiometry, Strip},
         pixel_file::PixelFile,
+        product_named,
     },
     products::{PictureFile, PictureFormat, PictureHead},
 };
@@ -23,6 +26,7 @@ use crate::{
 ///
 /// Example: areograph image extract m0100115.imq --out m0100115.png
 #[derive(Debug, Args)]
+#[allow(clippy::doc_markdown, reason = "help is printed verbatim")]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
     /// Image file of the archive (.imq, .img), ISIS cube, TIFF or PNG of one band of grey.
@@ -40,6 +44,10 @@ pub(super) struct Arguments {
     /// Also write a mask of good (255), suspect (128) and missing (0) lines, in one of the same formats.
     #[arg(long, value_name = "FILE")]
     mask: Option<PathBuf>,
+    /// Ground control points for the TIFF, with which QGIS and gdalwarp place it on a map: control_points.csv among the
+    /// products of a site, or a table with its columns. Between the points, the image follows no relief.
+    #[arg(long, value_name = "CSV")]
+    control: Option<PathBuf>,
 }
 
 /// An unsupported extension.
@@ -60,6 +68,30 @@ struct NoLines;
 #[cause(Configuration: "give the .imq or .img file, or omit --calibrate")]
 struct NotOfTheArchive;
 
+/// Control points that do not belong to the picture.
+#[derive(Debug, thiserror::Error, Cause)]
+enum ControlError {
+    #[error("{}: PNG files have no ground control points", .0.display())]
+    #[cause(Configuration: "write a TIFF: name the file with the extension .tif")]
+    NotATiff(PathBuf),
+    #[error("its points are in the image {control}, and the label states {product}")]
+    #[cause(Input: "give the control points of this image")]
+    Product { control: String, product: String },
+    #[error("its points are on the body {0}, and the image shows mars")]
+    #[cause(Input: "give the control points of this image")]
+    Body(&'static str),
+    #[error(
+        "a point is at line {line} and sample {sample}; expected 0 to {lines} and 0 to {samples}, the edges of the image"
+    )]
+    #[cause(Input: "give the control points of this image, and check their lines and samples")]
+    Outside {
+        line: f64,
+        sample: f64,
+        lines: u32,
+        samples: u32,
+    },
+}
+
 /// Margin beyond the range of the pixels for the correction of odd and even samples, DN.
 const ROOM_DN: f64 = 16.0;
 
@@ -76,7 +108,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
     let format = format(&arguments.out)?;
     let mask_format = arguments.mask.as_deref().map(self::format).transpose()?;
     let outputs = std::iter::once(&arguments.out).chain(&arguments.mask);
-    require_apart(outputs.map(PathBuf::as_path), [arguments.file.as_path()])?;
+    let inputs = std::iter::once(&arguments.file).chain(&arguments.control);
+    require_apart(outputs.map(PathBuf::as_path), inputs.map(PathBuf::as_path))?;
+    if arguments.control.is_some() && format != PictureFormat::Tiff {
+        return Err(ControlError::NotATiff(arguments.out.clone()).into());
+    }
     let progress = Progress::of_work("image extract");
     progress.show("decoding".to_owned());
     let image = PixelFile::open(&arguments.file, all_instruments())?;
@@ -94,6 +130,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
     })?;
     let height = u32::try_from(lines).ok().filter(|height| *height > 0);
     let height = height.ok_or(NoLines).in_file(&arguments.file)?;
+    let control = arguments.control.as_deref();
+    let control = control.map(|path| control_of(path, &image, height));
     let calibration = arguments
         .calibrate
         .then(|| Calibration::new(image.archive().ok_or(NotOfTheArchive)?, &odd_even))
@@ -104,6 +142,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
         height,
         is_deep: calibration.is_some(),
         notes: notes(&image, calibration.as_ref()),
+        control: control.transpose()?,
     };
     let mut mask = match (&arguments.mask, mask_format) {
         (Some(path), Some(format)) => {
@@ -140,6 +179,39 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
         image.samples()
     ));
     Ok(())
+}
+
+/// The control points of an image of so many lines.
+fn control_of(path: &Path, image: &PixelFile, lines: u32) -> Result<ImageControl> {
+    let control = read_image_control(path)?;
+    let label = image.label();
+    let product = label.and_then(|label| label.product_id.as_deref());
+    let named = [Some(&*control.image), product].map(|name| name.and_then(product_named));
+    if let ([Some(one), Some(other)], Some(product)) = (&named, product)
+        && one != other
+    {
+        let (control, product) = (control.image.clone(), product.to_owned());
+        return Err(ControlError::Product { control, product }).in_file(path);
+    }
+    if image.archive().is_some() && control.body != Body::Mars {
+        return Err(ControlError::Body(control.body.word())).in_file(path);
+    }
+    let samples = image.samples();
+    let is_outside = |line: f64, sample: f64| {
+        !(0.0..=f64::from(lines)).contains(&line) || !(0.0..=f64::from(samples)).contains(&sample)
+    };
+    let mut points = control.points.iter();
+    if let Some(point) = points.find(|point| is_outside(point.line, point.sample)) {
+        let (line, sample) = (point.line, point.sample);
+        return Err(ControlError::Outside {
+            line,
+            sample,
+            lines,
+            samples,
+        })
+        .in_file(path);
+    }
+    Ok(control)
 }
 
 fn format(path: &Path) -> Result<PictureFormat> {

@@ -1,5 +1,7 @@
 //! `areograph pedr index`.
 
+mod remote;
+
 use std::{
     collections::BTreeSet,
     fs,
@@ -13,21 +15,39 @@ use serde_json::json;
 use crate::{
     cli::{output, progress::Progress},
     error::{Cause, Error, IoError, Locate as _},
-    files::{Identity, hash_file, require_own, short_hash},
+    files::{Identity, hash_file, require_own, short_hash, stand_in::StandIn},
     pds::archive::{INDEX, INDEX_MARK, Index, IndexedFile, Listing},
     store::atomic,
 };
 
-/// Creates or updates the index of the PEDR files in and below a folder; only new and changed files are read.
+/// Creates or updates the index of the PEDR files in and below a folder, or of an archive on a server; only new and
+/// changed files are read.
 ///
 /// `run` and `pedr search` use the index automatically. Their results do not depend on it, even if it is out of date. The
-/// index is the file areograph-pedr.index in the folder. If the command is killed, the index remains unchanged.
+/// index of a folder is the file areograph-pedr.index in it. If the command is killed, the index remains unchanged.
+///
+/// Of an archive on a server (https://), every file is streamed once, and a stand-in of each is written below the folder
+/// of --into: a few kilobytes with the place of its shots and the hashes of its blocks. All commands accept stand-ins
+/// in place of PEDR files, and read the blocks that they need from the server. An interrupted command continues
+/// with the first incomplete file.
 #[derive(Debug, Args)]
-#[command(after_help = "Example: areograph pedr index /data/mola")]
+#[command(after_help = "Examples:
+  areograph pedr index /data/mola
+  areograph pedr index https://archive.example.org/pedr/data/ --into mola")]
 pub(super) struct Arguments {
-    /// Folder of the archive.
-    #[arg(value_name = "FOLDER")]
+    /// Folder of the archive, or its address.
+    #[arg(value_name = "FOLDER|URL")]
     folder: PathBuf,
+    /// Folder for the stand-ins of an archive on a server.
+    #[arg(long, value_name = "DIR")]
+    into: Option<PathBuf>,
+    /// List of the files of an archive on a server: a path below its address, or an address, in each line; by default,
+    /// listings of the server.
+    #[arg(long, value_name = "FILE", requires = "into")]
+    list: Option<PathBuf>,
+    /// File with contact and limits of transfers, in the form of config/archives/mgs.toml.
+    #[arg(long, value_name = "FILE", requires = "into")]
+    archives: Option<PathBuf>,
     /// Read every file again, and list the files whose content differs from the index.
     #[arg(long)]
     verify: bool,
@@ -71,7 +91,33 @@ struct Outcome {
     failures: Vec<Error>,
 }
 
+/// An address without a folder, or the other way round.
+#[derive(Debug, thiserror::Error, Cause)]
+#[error("{0}")]
+#[cause(Configuration: "write `areograph pedr index FOLDER`, or `areograph pedr index URL --into FOLDER`")]
+struct Usage(&'static str);
+
+/// A folder of stand-ins alone.
+#[derive(Debug, thiserror::Error, Cause)]
+#[error(
+    "the folder contains only stand-ins of files on a server, which carry their index; expected PEDR files"
+)]
+#[cause(Configuration: "to update stand-ins, give the address of the archive (see areograph-archive.toml in the folder) and --into")]
+struct OnlyStandIns;
+
 pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
+    let address = arguments.folder.to_str();
+    let address = address.filter(|address| address.contains("://"));
+    match (address, &arguments.into) {
+        (Some(url), Some(into)) => return remote::run(url, into, arguments),
+        (Some(_), None) => {
+            return Err(Usage("an address without a folder for the stand-ins").into());
+        }
+        (None, Some(_)) => {
+            return Err(Usage("--into without the address of an archive (https://…)").into());
+        }
+        (None, None) => {}
+    }
     // Nothing is created for a mistyped path.
     fs::read_dir(&arguments.folder)
         .map_err(IoError::on("list"))
@@ -81,6 +127,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     let earlier = Index::read(&path).unwrap_or_default();
     let mut listing = Listing::below(&arguments.folder);
     let unseen = unseen(&earlier, &arguments.folder, &listing.failures);
+    let files = listing.paths.len();
+    listing.paths.retain(|path| !StandIn::is_at(path));
+    if listing.paths.is_empty() && files > 0 {
+        return Err(OnlyStandIns).in_file(&arguments.folder);
+    }
     if listing.paths.is_empty() && earlier.files().next().is_none() {
         let failure = listing.failures.pop();
         return Err(failure.unwrap_or_else(|| Error::from(NoFiles).in_file(&arguments.folder)));

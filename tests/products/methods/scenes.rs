@@ -19,7 +19,10 @@ use areograph::{
     watch::Watch,
 };
 
-use crate::common::{flows::run_into, pair::write_three_images};
+use crate::common::{
+    flows::run_into,
+    pair::{write_pair_on_shots, write_three_images},
+};
 
 /// Inputs and a flow over them.
 pub(crate) struct Scene {
@@ -34,7 +37,7 @@ pub(crate) struct Scene {
 }
 
 /// Scenes that take seconds. The last one, whose pixels are matched, takes most.
-pub(crate) static SHORT: [Scene; 6] = [
+pub(crate) static SHORT: [Scene; 7] = [
     Scene {
         name: "mission",
         write: write_mission,
@@ -85,6 +88,16 @@ pub(crate) static SHORT: [Scene; 6] = [
         declared: &[
             ("match_laser", "MatchLaser"),
             (PUBLISH, "flow/laser_match.rs"),
+        ],
+    },
+    Scene {
+        name: "on_shots",
+        write: write_pair_on_shots,
+        run: |folder| run_site_in(folder, "pair.toml"),
+        declared: &[
+            ("search_footprints", "ReadShots"),
+            ("check_ranges", "CheckTableRanges"),
+            (PUBLISH, "flow/publish.rs"),
         ],
     },
     Scene {

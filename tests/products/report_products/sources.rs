@@ -259,7 +259,7 @@ fn hardly_a_number_of_a_table_is_without_its_place() {
 
 /// Paragraphs and lists with numbers that no document tells, by their first words, with what holds them instead.
 const TEXTS: [(&str, &str); 21] = [
-    ("Relief alone would determine", "tests/report_geometric"),
+    ("Relief alone determines", "a test of this sentence below"),
     ("Surface kriged", "300 m is part of what roughness means"),
     ("At the tie points, the surface", "names of profiles"),
     ("E02-00665 and E02-01453", "the table below has the same"),
@@ -341,6 +341,38 @@ fn column(html: &str) -> String {
 
 fn column_text(html: &str) -> String {
     text(&format!("<t{}", html.split("</t").next().unwrap()))
+}
+
+#[test]
+fn the_sentence_on_relief_has_the_numbers_of_the_adjustment() {
+    let folder = gusev();
+    let page = page_of(&folder);
+    let mut paragraphs = page.split("<p").map(text);
+    let paragraph = paragraphs.find(|of| of.contains("Relief alone determines"));
+    let paragraph = paragraph.unwrap();
+    let sentence = paragraph.split_inclusive("used.").next().unwrap();
+    let relief = &json(&folder.join("adjustment.json"))["adjustment"]["relief"];
+    let compared = &relief["choice"]["compared"];
+    let axes = [
+        &relief["sigma_m"],
+        &compared["without_sigma_m"],
+        &compared["with_sigma_m"],
+    ];
+    let expected = axes.into_iter().flat_map(|of| of.as_array().unwrap());
+    let expected: Vec<f64> = expected.map(|of| of.as_f64().unwrap()).collect();
+    let shown = numbers(sentence);
+    assert!(
+        shown.len() == 6 && expected.len() == 6,
+        "{sentence} {expected:?}"
+    );
+    for ((shown, _), expected) in shown.iter().zip(&expected) {
+        // Whole metres.
+        assert!((shown - expected).abs() <= 0.5, "{sentence} {expected:?}");
+    }
+    assert_eq!(
+        relief["used"] == true,
+        sentence.contains("; relief is used")
+    );
 }
 
 #[test]

@@ -19,6 +19,8 @@ use super::{
 };
 
 const KEYS: &str = "common_bus = \"yes\"\n";
+/// Relief would determine the position as well.
+const ALONE: &str = "relief_for_plan = \"no\"\n";
 
 /// A site run without the laser's place in images and with it.
 struct Both {
@@ -44,7 +46,13 @@ fn configure(mission: &Path, keys: &str) {
 fn both_ways(folder: &Path, seed: u32, options: &[&str], keys: &str) -> Vec<Both> {
     let mission = scene(folder, seed, options);
     let [plain, bus] = ["plain", "bus"].map(|way| folder.join(way));
+    configure(&mission, ALONE);
     succeed(&mut run(&mission, &plain));
+    for site in SITES {
+        let path = mission.join(format!("sites/{site}.toml"));
+        let text = fs::read_to_string(&path).unwrap();
+        fs::write(&path, text.replacen(ALONE, "", 1)).unwrap();
+    }
     configure(&mission, keys);
     succeed(&mut run(&mission, &bus));
     let truth = json(&mission.join("truth.json"));
@@ -95,7 +103,7 @@ const ACROSS: Trial<'_> = Trial {
     seeds: 401..=412,
     few: 12,
     options: &["--realistic"],
-    keys: KEYS,
+    keys: "common_bus = \"yes\"\nrelief_for_plan = \"no\"\n",
     better: &[0],
     limits: [0.75, 1.3],
 };
@@ -215,7 +223,7 @@ fn where_line_times_are_right_the_laser_tells_the_place_along_the_flight_too() {
         seeds: 421..=422,
         few: 1,
         options: &["--realistic", "--attitude-clock"],
-        keys: &format!("{KEYS}boresight_line_time_sigma_ms = 0.0\n"),
+        keys: &format!("{KEYS}{ALONE}boresight_line_time_sigma_ms = 0.0\n"),
         better: &[0, 1],
         limits: [0.2, 1.76],
     });
@@ -224,7 +232,7 @@ fn where_line_times_are_right_the_laser_tells_the_place_along_the_flight_too() {
 /// What one site of a mission with a mistake ends in: its exit code, what is told, and its output.
 fn ending(mission: &Path, name: &str, change: impl Fn(String) -> String) -> (i32, String, PathBuf) {
     let text = fs::read_to_string(mission.join("sites/isidis.toml")).unwrap();
-    let text = change(text.replacen("[adjustment]\n", &format!("[adjustment]\n{KEYS}"), 1));
+    let text = change(text.replacen("[adjustment]\n", &format!("[adjustment]\n{KEYS}{ALONE}"), 1));
     let path = mission.join(format!("sites/{name}.toml"));
     fs::write(&path, text).unwrap();
     let out = mission.join(name);

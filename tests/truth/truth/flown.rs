@@ -251,6 +251,8 @@ pub(super) struct Plan<'a> {
     pub(super) sizes: Sizes,
     /// Further laser passes over each site.
     pub(super) passes: u32,
+    /// Whether sites have tie points at laser shots.
+    pub(super) ties_at_shots: bool,
     /// Further keys of the adjustment.
     pub(super) keys: &'a str,
     /// Changes the errors.
@@ -268,6 +270,7 @@ impl Plan<'_> {
             noise_px,
             sizes: Sizes::Drawn,
             passes: 0,
+            ties_at_shots: false,
             keys: "",
             errors: |_| {},
             files: |_, _| {},
@@ -290,6 +293,7 @@ impl Plan<'_> {
             seed: self.seed.into(),
             day_s: 600.0,
             passes: self.passes,
+            ties_at_shots: self.ties_at_shots,
             errors,
         };
         {

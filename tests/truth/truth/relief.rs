@@ -58,15 +58,18 @@ fn both_ways(folder: &Path, seed: u32) -> Vec<Both> {
         "0.3",
     ];
     let mission = scene(folder, seed, &options);
-    let [ignored, used] = ["ignored", "used"].map(|way| folder.join(way));
-    succeed(&mut run(&mission, &ignored));
-    for site in SITES {
-        let path = mission.join(format!("sites/{site}.toml"));
-        let text = fs::read_to_string(&path).unwrap();
-        let keys = "[adjustment]\nrelief_for_plan = \"yes\"\n";
-        fs::write(&path, text.replacen("[adjustment]\n", keys, 1)).unwrap();
-    }
-    succeed(&mut run(&mission, &used));
+    let [ignored, used] = [("ignored", "no"), ("used", "yes")].map(|(way, word)| {
+        let out = folder.join(way);
+        for site in SITES {
+            let path = mission.join(format!("sites/{site}.toml"));
+            let text = fs::read_to_string(&path).unwrap();
+            let text = text.replace("relief_for_plan = \"no\"\n", "");
+            let keys = format!("[adjustment]\nrelief_for_plan = \"{word}\"\n");
+            fs::write(&path, text.replacen("[adjustment]\n", &keys, 1)).unwrap();
+        }
+        succeed(&mut run(&mission, &out));
+        out
+    });
     let both = SITES.map(|site| {
         let document = json(&ignored.join(site).join("adjustment.json"));
         let relief = &document["adjustment"]["relief"]["sigma_m"];

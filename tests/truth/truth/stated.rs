@@ -30,14 +30,15 @@ const GROUNDS: [Roughness; 4] = [
 ];
 const NOISES_PX: [f64; 3] = [1.0, 0.5, 0.22];
 /// Keys of the adjustment by which missions are run as well.
-const KEYS: [[&str; 2]; 3] = [
-    ["default values", ""],
-    ["`common_bus`", "common_bus = \"yes\"\n"],
+const KEYS: [[&str; 2]; 2] = [
+    ["`relief_for_plan = \"no\"`", WITHOUT_RELIEF],
     [
-        "`common_bus` and `relief_for_plan`",
-        "common_bus = \"yes\"\nrelief_for_plan = \"yes\"\n",
+        "`common_bus = \"yes\"` and `relief_for_plan = \"no\"`",
+        "common_bus = \"yes\"\nrelief_for_plan = \"no\"\n",
     ],
 ];
+/// `profiles` tests positions with relief.
+const WITHOUT_RELIEF: &str = "relief_for_plan = \"no\"\n";
 
 /// Errors of one quantity with what is stated of them.
 struct Quantity {
@@ -237,7 +238,7 @@ fn other_first_seed() -> Option<u32> {
 fn plans(keys: &'static str, first_seed: u32) -> Vec<Plan<'static>> {
     let count = match (long(), keys) {
         (false, _) => MISSIONS_OF_EVERY_RUN,
-        (true, "") => MISSIONS,
+        (true, WITHOUT_RELIEF) => MISSIONS,
         (true, _) => MISSIONS_WITH_KEYS,
     };
     (0..count)

@@ -53,15 +53,30 @@ pub fn listing(page: &str) -> Vec<Listed> {
     files
 }
 
+/// The addresses of all links of a page.
+pub(crate) fn addresses(page: &str) -> Vec<&str> {
+    let lower = page.to_ascii_lowercase();
+    let links = lower.match_indices("<a").filter_map(|(at, _)| {
+        let is_link = page[at + 2..].starts_with(|letter: char| letter.is_ascii_whitespace());
+        address_of(&page[at..]).filter(|_| is_link)
+    });
+    links.collect()
+}
+
+/// The address of a link.
+fn address_of(link: &str) -> Option<&str> {
+    let start = link.to_ascii_lowercase().find("href=")? + "href=".len();
+    let quote = link[start..].chars().next()?;
+    match quote {
+        '"' | '\'' => link[start + 1..].split(quote).next(),
+        _ => link[start..].split([' ', '>']).next(),
+    }
+}
+
 /// The last part of the address of a link, and the text behind the link.
 fn named(link: &str) -> Option<(&str, &str)> {
     let lower = link.to_ascii_lowercase();
-    let start = lower.find("href=")? + "href=".len();
-    let quote = link[start..].chars().next()?;
-    let address = match quote {
-        '"' | '\'' => link[start + 1..].split(quote).next()?,
-        _ => link[start..].split([' ', '>']).next()?,
-    };
+    let address = address_of(link)?;
     let name = address.rsplit('/').next()?;
     let behind = &link[lower.find("</a>")? + "</a>".len()..];
     (is_name(name) && name.contains('.')).then_some((name, behind))
@@ -186,6 +201,7 @@ mod tests {
     proptest::proptest! {
         #[test]
         fn no_page_stops_the_reader(page in "(<a href=|</a>|\"|é|<br>|>| 1:2|9K|\n|a.b){0,40}") {
+            let _ = addresses(&page);
             for file in listing(&page) {
                 proptest::prop_assert!(is_name(&file.name));
             }

@@ -6,4 +6,5 @@ mod listing;
 
 pub use checksums::{Checksums, checksums};
 pub use kernels::{KernelRow, kernel_rows};
+pub(crate) use listing::addresses;
 pub use listing::{Listed, listing};

@@ -214,6 +214,7 @@ fn a_profile_on_relief_lies_in_one_place() {
         network.heights = Some(HeightControl {
             surface,
             jitter: None,
+            common_noise: None,
             compared: Vec::new(),
             observed: CONTROLLED.collect(),
         });

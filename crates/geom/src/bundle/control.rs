@@ -9,6 +9,8 @@ pub struct HeightControl {
     pub surface: LaserSurface,
     /// Jitter of the attitudes, an error of heights that determine planimetry; `None` for steady attitudes.
     pub jitter: Option<Jitter>,
+    /// Noise that measurements of neighbouring points have in common, likewise.
+    pub common_noise: Option<CommonNoise>,
     /// Indices of the points whose height is compared with it.
     pub compared: Vec<usize>,
     /// Indices of the points whose height is an observation; the covariance of the heights is full.
@@ -22,4 +24,13 @@ pub struct Jitter {
     pub sigma_rad: f64,
     /// Time over which its correlation falls to 1/e, seconds.
     pub time_s: f64,
+}
+
+/// Errors of measurements that neighbours have in common, as errors of matching are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CommonNoise {
+    /// Correlation of the errors of points at the same place, 0 to 1.
+    pub share: f64,
+    /// Distance over which the correlation falls to 1/e, metres.
+    pub reach_m: f64,
 }

@@ -53,6 +53,7 @@ fn observed(surface: LaserSurface) -> HeightControl {
     HeightControl {
         surface,
         jitter: None,
+        common_noise: None,
         compared: Vec::new(),
         observed: CONTROLLED.collect(),
     }
@@ -403,6 +404,7 @@ fn heights_that_are_only_compared_change_nothing() {
     network.heights = Some(HeightControl {
         surface,
         jitter: None,
+        common_noise: None,
         compared: CONTROLLED.collect(),
         observed: Vec::new(),
     });

@@ -61,6 +61,11 @@ impl Heights {
         true
     }
 
+    /// Positions of the points at the last evaluation of the surface, metres.
+    pub(super) fn places_m(&self) -> &[Vector3<f64>] {
+        &self.places_m
+    }
+
     /// Covariance of the observed heights, robust weights included, m².
     pub(super) fn covariance_m2(&self) -> DMatrix<f64> {
         let mut covariance_m2 = self.surface.covariance_m2.clone();
@@ -147,14 +152,14 @@ fn predicted(
     shared: &[(usize, [Option<usize>; 3])],
 ) -> SurfaceHeights {
     let mut heights = surface.predict(places_m);
-    let profiles = heights.relief.iter().flat_map(|relief| &relief.profiles);
+    let Some(relief) = &heights.relief else {
+        return heights;
+    };
     let is_shared = |profile: usize| shared.iter().any(|(of, _)| *of == profile);
-    for profile in profiles.filter(|of| is_shared(of.profile)) {
-        let mut by_shift = profile.by_shift.clone();
-        for (mut row, sigma_m) in by_shift.row_iter_mut().zip(&profile.sigma_m) {
-            row *= *sigma_m;
-        }
-        heights.covariance_m2 -= by_shift.tr_mul(&by_shift);
+    let profiles = relief.profiles.iter().enumerate();
+    for (at, profile) in profiles.filter(|(_, of)| is_shared(of.profile)) {
+        let own_m2 = relief.covariance_m2.fixed_view::<3, 3>(3 * at, 3 * at);
+        heights.covariance_m2 -= profile.by_shift.tr_mul(&(own_m2 * &profile.by_shift));
     }
     heights
 }

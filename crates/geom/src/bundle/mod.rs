@@ -130,7 +130,7 @@ mod tests;
 use nalgebra::{DMatrix, Matrix3, Vector2, Vector3};
 
 pub use common_bus::{AdjustedBus, CommonBus, Estimate, RecordedProfile, SharedRotation, Spot};
-pub use control::{HeightControl, Jitter};
+pub use control::{CommonNoise, HeightControl, Jitter};
 pub use error::BundleError;
 pub use known::KnownCoordinates;
 pub use part::Part;

@@ -12,6 +12,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::{
     HeightResidual,
+    control::CommonNoise,
     heights::Heights,
     jitter,
     layout::{Layout, Linearised},
@@ -21,6 +22,20 @@ use crate::{
     blocked_cholesky::BlockedCholesky,
     pushbroom::{ExteriorOrientation, Unseen},
 };
+
+/// Covariance of heights by errors that measurements of neighbouring points have in common, m²; `turned` as in
+/// [`ReducedHeights`]. The variances of the rays stay as they are: an upper bound.
+fn common_m2(
+    common: &CommonNoise,
+    places_m: &[Vector3<f64>],
+    turned: &[Vector3<f64>],
+) -> DMatrix<f64> {
+    DMatrix::from_fn(turned.len(), turned.len(), |row, column| {
+        let apart_m = (places_m[row] - places_m[column]).norm();
+        let by_rays_m2 = turned[row].norm() * turned[column].norm();
+        common.share * by_rays_m2 * (-apart_m / common.reach_m).exp()
+    })
+}
 
 /// Heights in terms of the shared unknowns.
 #[derive(Clone)]
@@ -44,12 +59,12 @@ pub(super) struct ReducedHeights {
 }
 
 impl ReducedHeights {
-    /// Reduces the heights; jitter counts where they determine planimetry.
+    /// Reduces the heights; jitter and common noise count where they determine planimetry.
     pub(super) fn of<M: ExteriorOrientation>(
         layout: &Layout<'_, M>,
         heights: &Heights,
         at: &Linearised,
-        with_jitter: bool,
+        is_for_plan: bool,
     ) -> Result<Self, Unseen> {
         let (count, columns) = (heights.points.len(), layout.columns.len());
         let mut misclosures_m = DVector::zeros(count);
@@ -85,8 +100,13 @@ impl ReducedHeights {
         let mut covariance_m2 = heights.covariance_m2();
         let control = layout.network.heights.as_ref();
         let jitter = control.and_then(|control| control.jitter.as_ref());
-        if let Some(jitter) = jitter.filter(|_| with_jitter) {
+        if let Some(jitter) = jitter.filter(|_| is_for_plan) {
             covariance_m2 += jitter::covariance_m2(layout, jitter, &heights.points, &by_shared);
+        }
+        let common = control.and_then(|control| control.common_noise.as_ref());
+        if let Some(common) = common.filter(|_| is_for_plan) {
+            // Where the surface was evaluated: a covariance that changes with every step has no minimum to converge to.
+            covariance_m2 += common_m2(common, heights.places_m(), &turned);
         }
         let ray_variances_m2 =
             DVector::from_iterator(count, turned.iter().map(Vector3::norm_squared));

@@ -1,6 +1,6 @@
 //! Planimetry from relief: heights of points on slopes fit the surface in one position only.
 
-use nalgebra::{DMatrix, Matrix3, MatrixXx2};
+use nalgebra::{DMatrix, DVector, MatrixXx2};
 
 use super::{
     factor::Factor, heights::Heights, layout::Layout, reduce::Settled,
@@ -38,29 +38,55 @@ pub(super) fn of_site<M: ExteriorOrientation>(
     left: Option<&DMatrix<f64>>,
 ) -> Option<ReliefOfSite> {
     let reduced = settled.reduced.heights.as_ref()?;
-    let weighted = reduced.weighted_differences();
-    let is_shared = |profile: usize| heights.shared.iter().any(|(of, _)| *of == profile);
-    let profiles = heights
-        .surface
-        .relief
-        .iter()
-        .flat_map(|relief| &relief.profiles);
-    let profiles = profiles.filter(|of| !is_shared(of.profile));
-    let shift = |of: &ProfileOnRelief| {
-        let variances_m2 = Matrix3::from_diagonal(&of.sigma_m.map(|sigma_m| sigma_m.powi(2)));
-        let shift_m = variances_m2 * &of.by_shift * &weighted;
-        let known = &of.by_shift * left? * of.by_shift.transpose();
-        let cofactors_m2 = variances_m2 - variances_m2 * known * variances_m2;
-        Some(ProfileShift {
-            profile: of.profile,
-            shift_m: shift_m.into(),
-            root_cofactors_m: cofactors_m2.diagonal().map(f64::sqrt).into(),
-        })
-    };
     Some(ReliefOfSite {
         sigma_m: sigma_m(layout, settled, heights)?,
-        profiles: profiles.filter_map(shift).collect(),
+        profiles: left.map_or_else(Vec::new, |left| {
+            shifts(heights, &reduced.weighted_differences(), left)
+        }),
     })
+}
+
+/// Shifts of the profiles of the surface whose shift is not a separate unknown.
+///
+/// * `weighted` – differences times the inverse of their covariance
+/// * `left` – as in [`of_site`]
+fn shifts(heights: &Heights, weighted: &DVector<f64>, left: &DMatrix<f64>) -> Vec<ProfileShift> {
+    let Some(relief) = &heights.surface.relief else {
+        return Vec::new();
+    };
+    let is_shared = |profile: usize| heights.shared.iter().any(|(of, _)| *of == profile);
+    let profiles = relief.profiles.iter().enumerate();
+    let profiles: Vec<(usize, &ProfileOnRelief)> =
+        profiles.filter(|(_, of)| !is_shared(of.profile)).collect();
+    let rows = profiles
+        .iter()
+        .flat_map(|(at, _)| [0, 1, 2].map(|axis| 3 * at + axis));
+    let rows: Vec<usize> = rows.collect();
+    let before_m2 = relief
+        .covariance_m2
+        .select_rows(&rows)
+        .select_columns(&rows);
+    let mut by_shift = DMatrix::zeros(rows.len(), weighted.len());
+    for (row, (_, of)) in profiles.iter().enumerate() {
+        by_shift.rows_mut(3 * row, 3).copy_from(&of.by_shift);
+    }
+    let by_covariance = &before_m2 * &by_shift;
+    let shifts_m = &by_covariance * weighted;
+    let known = left * by_covariance.transpose();
+    let of_profile = |(row, (_, of)): (usize, &(usize, &ProfileOnRelief))| ProfileShift {
+        profile: of.profile,
+        shift_m: [0, 1, 2].map(|axis| {
+            let removed_m = if axis < 2 { of.removed_m[axis] } else { 0.0 };
+            removed_m + shifts_m[3 * row + axis]
+        }),
+        root_cofactors_m: [0, 1, 2].map(|axis| {
+            let at = 3 * row + axis;
+            let known_m2 = by_covariance.row(at).transpose().dot(&known.column(at));
+            // Rounding may leave the variance of a shift that is known exactly a little below 0.
+            (before_m2[(at, at)] - known_m2).max(0.0).sqrt()
+        }),
+    };
+    profiles.iter().enumerate().map(of_profile).collect()
 }
 
 /// Standard deviation of a shift common to all points from heights only: their differences are uncertain by rays,

@@ -73,28 +73,85 @@ pub(super) fn reduced_rows(
     freedom: &Freedom,
     place_m: &Vector3<f64>,
 ) -> Result<DMatrix<f64>, SightError> {
-    let known = if point.known.is_some() { 3 } else { 0 };
-    let count = 2 * point.sights.len() + known;
     let unknowns = freedom.len();
-    let mut by_place = DMatrix::zeros(count, 3);
-    let mut rest = DMatrix::zeros(count, unknowns + 1);
-    for (index, sight) in point.sights.iter().enumerate() {
-        let rows = sight.rows(state, place_m)?;
-        by_place.rows_mut(2 * index, 2).copy_from(&rows.by_place);
-        let mut into = rest.rows_mut(2 * index, 2);
-        into.columns_mut(0, unknowns)
-            .copy_from(&freedom.rows(rows.by_parameters));
-        into.column_mut(unknowns).copy_from(&-rows.residual);
-    }
-    if let Some(known) = &point.known {
-        let first = count - 3;
-        by_place.rows_mut(first, 3).copy_from(&known.whitening);
-        let off = known.whitening * (known.place_m - place_m);
-        rest.rows_mut(first, 3).column_mut(unknowns).copy_from(&off);
-    }
-    if count < 3 {
-        return Err(SightError::Parallel);
-    }
+    let Rows {
+        by_place,
+        by_parameters,
+        residuals,
+    } = Rows::of(point, state, freedom, place_m)?;
+    let mut rest = by_parameters.insert_column(unknowns, 0.0);
+    rest.column_mut(unknowns).copy_from(&-residuals);
+    let count = rest.nrows();
     by_place.qr().q_tr_mul(&mut rest);
     Ok(rest.rows(3, count - 3).into_owned())
+}
+
+/// Changes of the right sides of the normal equations of a control point by shifts of its known position, columns.
+pub(super) fn response(
+    point: &GroundPoint,
+    state: &CalibrationState,
+    freedom: &Freedom,
+    place_m: &Vector3<f64>,
+    shifts_m: &[Vector3<f64>; 3],
+) -> Result<DMatrix<f64>, SightError> {
+    let rows = Rows::of(point, state, freedom, place_m)?;
+    let count = rows.by_place.nrows();
+    let mut shifted = DMatrix::zeros(count, shifts_m.len());
+    if let Some(known) = &point.known {
+        for (column, shift_m) in shifts_m.iter().enumerate() {
+            let mut into = shifted.column_mut(column);
+            into.rows_mut(count - 3, 3)
+                .copy_from(&(known.whitening * shift_m));
+        }
+    }
+    let mut by_parameters = rows.by_parameters;
+    let reflections = rows.by_place.qr();
+    reflections.q_tr_mul(&mut by_parameters);
+    reflections.q_tr_mul(&mut shifted);
+    let below = |of: &DMatrix<f64>| of.rows(3, count - 3).into_owned();
+    Ok(below(&by_parameters).tr_mul(&below(&shifted)))
+}
+
+/// All rows of a point, over their standard deviations; those of its known position are last.
+struct Rows {
+    by_place: DMatrix<f64>,
+    by_parameters: DMatrix<f64>,
+    residuals: DVector<f64>,
+}
+
+impl Rows {
+    fn of(
+        point: &GroundPoint,
+        state: &CalibrationState,
+        freedom: &Freedom,
+        place_m: &Vector3<f64>,
+    ) -> Result<Self, SightError> {
+        let known = if point.known.is_some() { 3 } else { 0 };
+        let count = 2 * point.sights.len() + known;
+        if count < 3 {
+            return Err(SightError::Parallel);
+        }
+        let mut of = Self {
+            by_place: DMatrix::zeros(count, 3),
+            by_parameters: DMatrix::zeros(count, freedom.len()),
+            residuals: DVector::zeros(count),
+        };
+        for (index, sight) in point.sights.iter().enumerate() {
+            let rows = sight.rows(state, place_m)?;
+            of.by_place.rows_mut(2 * index, 2).copy_from(&rows.by_place);
+            of.by_parameters
+                .rows_mut(2 * index, 2)
+                .copy_from(&freedom.rows(rows.by_parameters));
+            of.residuals
+                .rows_mut(2 * index, 2)
+                .copy_from(&rows.residual);
+        }
+        if let Some(known) = &point.known {
+            let first = count - 3;
+            of.by_place.rows_mut(first, 3).copy_from(&known.whitening);
+            let off = known.whitening * (place_m - known.place_m);
+            of.residuals.rows_mut(first, 3).copy_from(&off);
+        }
+        Ok(of)
+    }
 }

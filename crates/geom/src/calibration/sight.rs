@@ -31,6 +31,17 @@ pub struct KnownPlace {
     pub place_m: Vector3<f64>,
     /// Rows along axes in which its errors are independent, over their standard deviations, 1/m.
     pub whitening: Matrix3<f64>,
+    /// The part of these errors that it shares with other points.
+    pub shared: Option<SharedError>,
+}
+
+/// An error that all points of a group share, such as those of one laser profile.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SharedError {
+    /// The group.
+    pub group: usize,
+    /// Standard deviations along a horizontal axis and of the radius, metres; part of the errors by which a point is weighted.
+    pub sigma_m: [f64; 2],
 }
 
 /// A point on the ground.

@@ -6,6 +6,7 @@ use super::{
     camera::CalibrationState,
     elimination::{Triangle, reduced_rows},
     freedom::Freedom,
+    shared::with_shared_errors,
     sight::{GroundPoint, SightError},
 };
 
@@ -79,8 +80,11 @@ pub fn solve(
         let inverse = triangle
             .solve_upper_triangular(&unit)
             .ok_or(CalibrationError::Singular)?;
+        let independent = &inverse * inverse.transpose();
+        let covariance = with_shared_errors(&independent, points, &state, freedom, &places_m)
+            .map_err(|(point, why)| CalibrationError::Point { point, why })?;
         return Ok(Solved {
-            covariance: freedom.covariance(&(&inverse * inverse.transpose())),
+            covariance: freedom.covariance(&covariance),
             state,
             places_m,
             steps,

@@ -1,6 +1,6 @@
 //! The model against central differences, and the datum defect of ties, on a circular orbit with two stereo lines.
 
-use nalgebra::{DVector, Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::{
     Axis, CalibrationState, Combination, Freedom, GroundPoint, LineCamera, LinePose, Offset,
@@ -361,6 +361,7 @@ fn a_calibration_of_exact_points_is_exact_where_it_can_be_seen() {
         point.known = Some(super::KnownPlace {
             place_m,
             whitening: Matrix3::identity(),
+            shared: None,
         });
     }
     let wide = |of: Parameter| match of {
@@ -391,5 +392,50 @@ fn a_calibration_of_exact_points_is_exact_where_it_can_be_seen() {
         // 0.2 px are 5 m on the ground and 11 m in height.
         let sigma_m = covariance.trace().sqrt();
         assert!((5.0..25.0).contains(&sigma_m), "{sigma_m} m");
+    }
+}
+
+/// The covariance contains the change of the estimate by every shared error.
+#[test]
+fn shared_errors_of_control_are_in_the_covariance() {
+    let known = laboratory();
+    let groups = 4;
+    let shared_m = [60.0, 6.0];
+    // The estimate after shifts of a group along local axes, and its covariance; `None` without shared errors.
+    let estimate = |shift: Option<(usize, usize)>, is_shared: bool| {
+        let mut points = ties(&known, 40, 0.0);
+        for (index, point) in points.iter_mut().enumerate() {
+            let mut place_m = point.place(&known).unwrap();
+            let axes = crate::ellipsoid::local_axes(&place_m);
+            if let Some((_, axis)) = shift.filter(|(group, _)| *group == index % groups) {
+                place_m += axes.row(axis).transpose() * shared_m[axis / 2];
+            }
+            let over = Vector3::new(0.01, 0.01, 0.1);
+            point.known = Some(super::KnownPlace {
+                place_m,
+                whitening: Matrix3::from_diagonal(&over) * axes,
+                shared: is_shared.then_some(super::SharedError {
+                    group: index % groups,
+                    sigma_m: shared_m,
+                }),
+            });
+        }
+        let start = Start {
+            known: &known,
+            from: &known,
+        };
+        let freedom = Freedom::each(known.layout(), sigma, |_| true);
+        solve(&points, start, &freedom).unwrap()
+    };
+    let unshifted = estimate(None, true);
+    let mut expected: DMatrix<f64> = estimate(None, false).covariance;
+    for (group, axis) in (0..groups).flat_map(|group| [0, 1, 2].map(|axis| (group, axis))) {
+        let moved = estimate(Some((group, axis)), true).state.vector() - unshifted.state.vector();
+        expected += &moved * moved.transpose();
+    }
+    for index in 0..expected.ncols() {
+        let [found, expected] = [&unshifted.covariance, &expected].map(|of| of[(index, index)]);
+        let off = (found / expected).sqrt() - 1.0;
+        assert!(off.abs() < 0.02, "{index}: {found} {expected}");
     }
 }

@@ -35,9 +35,12 @@
 
 mod crossovers;
 mod fractional_power;
+#[cfg(test)]
+mod invented_profiles;
 mod kriging;
 mod left_out;
 mod plan;
+mod plan_shifts;
 mod prediction;
 mod profiles;
 mod shot;
@@ -56,6 +59,7 @@ use areograph_base::body::{Body, BodyModel};
 
 pub use crossovers::{Crossover, crossovers};
 pub use left_out::{LeftOut, ProfilePriors};
+pub use plan_shifts::PlanShifts;
 pub use prediction::{MeanHeight, PlaceHeight, ProfileOnRelief, Relief, SurfaceHeights};
 pub use profiles::{ProfileNet, ProfileShift};
 pub use shot::{
@@ -147,6 +151,29 @@ impl LaserSurface {
         around: &[Vector3<f64>],
         options: &SurfaceOptions,
     ) -> Result<Self, SurfaceError> {
+        Self::of(shots, around, options, None)
+    }
+
+    /// The same where shifts of profiles in plan are known from their crossovers: they are removed from the shots, and
+    /// where relief determines planimetry, their covariance replaces `profile_plan_sigma_m`.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_plan_shifts(
+        shots: &[SurfaceShot],
+        around: &[Vector3<f64>],
+        options: &SurfaceOptions,
+        shifts: &PlanShifts,
+    ) -> Result<Self, SurfaceError> {
+        Self::of(&shifts.removed_from(shots), around, options, Some(shifts))
+    }
+
+    fn of(
+        shots: &[SurfaceShot],
+        around: &[Vector3<f64>],
+        options: &SurfaceOptions,
+        shifts: Option<&PlanShifts>,
+    ) -> Result<Self, SurfaceError> {
         if shots.len() < SHOTS_MIN {
             return Err(SurfaceError::TooFew { shots: shots.len() });
         }
@@ -167,7 +194,7 @@ impl LaserSurface {
             .ok_or(SurfaceError::NotANumber)?;
         Ok(Self {
             plan,
-            of_profiles: OfProfiles::new(&kriging, options.uses_relief),
+            of_profiles: OfProfiles::new(&kriging, options, shifts),
             kriging,
             roughness,
             options: *options,
@@ -190,6 +217,12 @@ impl LaserSurface {
     #[must_use]
     pub const fn uses_relief(&self) -> bool {
         self.options.uses_relief
+    }
+
+    /// A priori standard deviation of the shift of a profile in plan on an axis, metres.
+    #[must_use]
+    pub const fn profile_plan_sigma_m(&self) -> f64 {
+        self.options.profile_plan_sigma_m
     }
 
     /// Number of shots of the surface.

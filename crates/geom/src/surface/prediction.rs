@@ -3,11 +3,11 @@
 //! Errors between all places have a matrix as large as the square of their number. A standard deviation of one place,
 //! or of a mean, is computed without it.
 
-use nalgebra::{DMatrix, DVector, Matrix3xX, Vector2, Vector3};
+use nalgebra::{Cholesky, DMatrix, DVector, Matrix3xX, Vector2, Vector3};
 use rayon::prelude::*;
 
 use super::{
-    GRADIENT_STEP_M, LaserSurface,
+    GRADIENT_STEP_M, LaserSurface, PlanShifts, SurfaceOptions,
     kriging::{Kriging, ProfileSums, Relation},
     shot::PROFILE_PLAN_M,
 };
@@ -66,6 +66,8 @@ pub struct Relief {
     pub by_place: Vec<Vector3<f64>>,
     /// The possible shift of each profile of the surface, one entry per profile.
     pub profiles: Vec<ProfileOnRelief>,
+    /// Covariance of these shifts in east, north and height, m²: three rows per profile.
+    pub covariance_m2: DMatrix<f64>,
 }
 
 /// Dependence of heights of the surface on the shift of one of its profiles.
@@ -76,8 +78,8 @@ pub struct ProfileOnRelief {
     /// Change of measured minus predicted heights when the profile is recorded farther to the east, to the north and
     /// higher than its true position: one row per point.
     pub by_shift: Matrix3xX<f64>,
-    /// Standard deviations of these shifts, metres.
-    pub sigma_m: Vector3<f64>,
+    /// Shift to the east and north that was removed from its shots, metres.
+    pub removed_m: Vector2<f64>,
 }
 
 impl SurfaceHeights {
@@ -95,19 +97,112 @@ pub(super) struct OfProfiles {
     /// Times the part of the errors in plan by which they exceed a profile at nadir of known attitude; `None` where no
     /// profile exceeds it.
     farther: Option<ProfileSums>,
-    /// Times 1, where relief determines planimetry.
-    all: Option<ProfileSums>,
+    /// Where relief determines planimetry.
+    on_relief: Option<Shifts>,
+}
+
+/// Possible shifts of the profiles of a surface.
+#[derive(Debug, Clone)]
+struct Shifts {
+    /// Weights of the profiles.
+    sums: ProfileSums,
+    profiles: Vec<usize>,
+    /// Shift that was removed from the shots of each profile, east and north, metres.
+    removed_m: Vec<Vector2<f64>>,
+    /// Standard deviation of the radial shift of each profile, metres.
+    radial_m: Vec<f64>,
+    /// Covariance of the remaining shifts in plan, m², two rows per profile, and its lower triangular factor.
+    plan_m2: DMatrix<f64>,
+    plan_factor: DMatrix<f64>,
+}
+
+impl Shifts {
+    fn new(kriging: &Kriging, options: &SurfaceOptions, known: Option<&PlanShifts>) -> Self {
+        let profiles = kriging.profiles();
+        let plan_m =
+            |profile: usize| kriging.shared_of(profile).plan * options.profile_plan_sigma_m;
+        let shift_m =
+            |profile: &usize| known.map_or_else(Vector2::zeros, |known| known.shift_m(*profile));
+        let radial = profiles.iter().map(|of| kriging.shared_of(*of).radial);
+        let independent = || {
+            let variances = profiles.iter().flat_map(|of| [plan_m(*of).powi(2); 2]);
+            DMatrix::from_diagonal(&DVector::from_iterator(2 * profiles.len(), variances))
+        };
+        let plan_m2 =
+            known.map_or_else(independent, |known| known.covariance_m2(&profiles, plan_m));
+        // Rounding may leave no factor of shifts that are known almost exactly: a square millimetre is above rounding.
+        let with_rounding = || {
+            let square_mm = DMatrix::from_diagonal_element(plan_m2.nrows(), plan_m2.ncols(), 1e-6);
+            Cholesky::new(&plan_m2 + square_mm)
+        };
+        let factor = Cholesky::new(plan_m2.clone()).or_else(with_rounding);
+        // Only a covariance that is not a number has no factor; it remains so.
+        let plan_factor = factor.map_or_else(|| plan_m2.clone(), Cholesky::unpack);
+        Self {
+            sums: kriging.sums_of_profiles(|_shared| 1.0),
+            removed_m: profiles.iter().map(shift_m).collect(),
+            radial_m: radial.map(|of| of * options.profile_sigma_m).collect(),
+            plan_m2,
+            plan_factor,
+            profiles,
+        }
+    }
+
+    /// Effects on heights of shifts in plan of one metre, one row per axis of each profile.
+    fn in_plan(&self, sighted: &Sighted) -> DMatrix<f64> {
+        let shares = self.sums.at(&sighted.relation);
+        DMatrix::from_fn(2 * shares.nrows(), shares.ncols(), |row, place| {
+            shares[(row / 2, place)] * sighted.slopes[place][row % 2]
+        })
+    }
+
+    fn relief(&self, sighted: &Sighted, by_place: Vec<Vector3<f64>>) -> Relief {
+        let shares = self.sums.at(&sighted.relation);
+        let slopes = &sighted.slopes;
+        let by_shift = |row: usize| {
+            Matrix3xX::from_fn(slopes.len(), |axis, place| {
+                let shift = if axis < 2 { slopes[place][axis] } else { -1.0 };
+                shares[(row, place)] * shift
+            })
+        };
+        let profiles = self.profiles.iter().zip(&self.removed_m).enumerate();
+        let covariance_m2 = DMatrix::from_fn(
+            3 * self.profiles.len(),
+            3 * self.profiles.len(),
+            |row, column| match (row % 3, column % 3) {
+                (2, 2) if row == column => self.radial_m[row / 3].powi(2),
+                (2, _) | (_, 2) => 0.0,
+                (axis, other) => self.plan_m2[(2 * (row / 3) + axis, 2 * (column / 3) + other)],
+            },
+        );
+        Relief {
+            by_place,
+            profiles: profiles
+                .map(|(row, (profile, removed_m))| ProfileOnRelief {
+                    profile: *profile,
+                    by_shift: by_shift(row),
+                    removed_m: *removed_m,
+                })
+                .collect(),
+            covariance_m2,
+        }
+    }
 }
 
 impl OfProfiles {
-    pub(super) fn new(kriging: &Kriging, uses_relief: bool) -> Self {
+    pub(super) fn new(
+        kriging: &Kriging,
+        options: &SurfaceOptions,
+        shifts: Option<&PlanShifts>,
+    ) -> Self {
+        let uses_relief = options.uses_relief;
         let mut shots = kriging.shots.iter();
         let is_farther = shots.any(|shot| shot.shared.farther_m() > 0.0);
         let farther = || kriging.sums_of_profiles(|shared| shared.farther_m() / PROFILE_PLAN_M);
         Self {
             radial: kriging.sums_of_profiles(|shared| shared.radial),
             farther: (is_farther && !uses_relief).then(farther),
-            all: uses_relief.then(|| kriging.sums_of_profiles(|_shared| 1.0)),
+            on_relief: uses_relief.then(|| Shifts::new(kriging, options, shifts)),
         }
     }
 }
@@ -133,13 +228,10 @@ impl LaserSurface {
         let without_plan_m2 = covariance_m2.clone();
         add_square(&mut covariance_m2, 1.0, &self.in_plan_m(&sighted));
         covariance_m2.fill_upper_triangle_with_lower_triangle();
-        let relief = self.of_profiles.all.as_ref().map(|all| Relief {
-            by_place: places_m
-                .iter()
-                .zip(&sighted.slopes)
-                .map(|(place, slope)| self.plan.by_place(place, slope))
-                .collect(),
-            profiles: self.on_relief(&sighted, &all.at(&sighted.relation)),
+        let relief = self.of_profiles.on_relief.as_ref().map(|shifts| {
+            let by_place = places_m.iter().zip(&sighted.slopes);
+            let by_place = by_place.map(|(place, slope)| self.plan.by_place(place, slope));
+            shifts.relief(&sighted, by_place.collect())
         });
         SurfaceHeights {
             body: self.options.body,
@@ -222,25 +314,14 @@ impl LaserSurface {
 
     /// Effects on heights of independent errors in plan on each axis, of one standard deviation, metres: two rows per
     /// error.
-    fn in_plan_m(
-        &self,
-        Sighted {
-            relation, slopes, ..
-        }: &Sighted,
-    ) -> DMatrix<f64> {
-        let shifts_m = match (&self.of_profiles.all, &self.of_profiles.farther) {
-            (Some(all), _) => {
-                let mut shifts_m = all.at(relation);
-                let profiles = self.kriging.profiles().into_iter();
-                for (mut row, profile) in shifts_m.row_iter_mut().zip(profiles) {
-                    row *= self.shift_sigmas_m(profile).x;
-                }
-                shifts_m
-            }
+    fn in_plan_m(&self, sighted: &Sighted) -> DMatrix<f64> {
+        let slopes = &sighted.slopes;
+        let shifts_m = match (&self.of_profiles.on_relief, &self.of_profiles.farther) {
+            (Some(shifts), _) => return shifts.plan_factor.tr_mul(&shifts.in_plan(sighted)),
             // Profiles that are farther from their place than others, each by itself: the part of the shift that all shots of a
             // profile share. The noise of these shots contains the same shift as independent errors.
             (None, Some(farther)) => {
-                let farther_m = farther.at(relation) * PROFILE_PLAN_M;
+                let farther_m = farther.at(&sighted.relation) * PROFILE_PLAN_M;
                 farther_m.insert_row(0, self.options.plan_sigma_m)
             }
             (None, None) => DMatrix::from_element(1, slopes.len(), self.options.plan_sigma_m),
@@ -248,32 +329,6 @@ impl LaserSurface {
         DMatrix::from_fn(2 * shifts_m.nrows(), slopes.len(), |row, place| {
             shifts_m[(row / 2, place)] * slopes[place][row % 2]
         })
-    }
-
-    /// Standard deviations of the shift of a profile in east, north and height, metres.
-    fn shift_sigmas_m(&self, profile: usize) -> Vector3<f64> {
-        let shared = self.kriging.shared_of(profile);
-        let plan_m = shared.plan * self.options.profile_plan_sigma_m;
-        Vector3::new(plan_m, plan_m, shared.radial * self.options.profile_sigma_m)
-    }
-
-    /// Each profile by its share in the heights, one row of `shares` per profile.
-    fn on_relief(&self, sighted: &Sighted, shares: &DMatrix<f64>) -> Vec<ProfileOnRelief> {
-        let slopes = &sighted.slopes;
-        let by_shift = |row: usize| {
-            Matrix3xX::from_fn(slopes.len(), |axis, place| {
-                let shift = if axis < 2 { slopes[place][axis] } else { -1.0 };
-                shares[(row, place)] * shift
-            })
-        };
-        let profiles = self.kriging.profiles().into_iter().enumerate();
-        profiles
-            .map(|(row, profile)| ProfileOnRelief {
-                profile,
-                by_shift: by_shift(row),
-                sigma_m: self.shift_sigmas_m(profile),
-            })
-            .collect()
     }
 
     /// The possible true positions: a planimetric error moves a point away from a profile, where the ground is known, as

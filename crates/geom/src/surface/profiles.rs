@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Vector3};
 
 use super::{
-    Crossover, SharedErrors,
+    Crossover, PlanShifts, SharedErrors,
     left_out::{LeftOut, ProfilePriors, student_weight, worst},
 };
 
@@ -70,18 +70,14 @@ impl ProfileNet {
     /// Shifts of all profiles with crossovers that are not left out.
     ///
     /// Where ground slopes, a shift in plan changes the height. Empty when a number is not finite.
+    ///
+    /// * `plan_sigma_m` – a priori standard deviation of a shift in plan on an axis, metres
     #[must_use]
-    pub fn shifts(&self, crossovers: &[Crossover], priors: &ProfilePriors) -> Vec<ProfileShift> {
+    pub fn shifts(&self, crossovers: &[Crossover], plan_sigma_m: f64) -> Vec<ProfileShift> {
         let used = self.belonging(crossovers);
-        let sigmas_m = [
-            priors.plan_sigma_m,
-            priors.plan_sigma_m,
-            self.radial_sigma_m,
-        ];
-        let mut net = Net::new(&used, &sigmas_m);
-        if !(0..4).all(|_| net.step(&sigmas_m)) {
+        let Some(net) = self.solved(&used, plan_sigma_m) else {
             return Vec::new();
-        }
+        };
         let covariance_m2 = net.covariance_m2();
         let shift = |(index, (profile, crossovers)): (usize, (&usize, &usize))| ProfileShift {
             profile: *profile,
@@ -92,6 +88,31 @@ impl ProfileNet {
                 .into_owned(),
         };
         net.profiles.iter().enumerate().map(shift).collect()
+    }
+
+    /// The same shifts in plan, all together; `None` without crossovers, or when a number is not finite.
+    #[must_use]
+    pub fn plan_shifts(&self, crossovers: &[Crossover], plan_sigma_m: f64) -> Option<PlanShifts> {
+        let used = self.belonging(crossovers);
+        let net = self.solved(&used, plan_sigma_m)?;
+        let covariance_m2 = net.covariance_m2();
+        let profiles: Vec<usize> = net.profiles.keys().copied().collect();
+        let in_plan = |row: usize| 3 * (row / 2) + row % 2;
+        let rows = 2 * profiles.len();
+        Some(PlanShifts::new(
+            profiles,
+            DVector::from_fn(rows, |row, _| net.shifts[in_plan(row)]),
+            DMatrix::from_fn(rows, rows, |row, column| {
+                covariance_m2[(in_plan(row), in_plan(column))]
+            }),
+        ))
+    }
+
+    /// The normal equations of the shifts in plan and along the radius, with robust weights.
+    fn solved<'a>(&self, used: &'a [Crossover], plan_sigma_m: f64) -> Option<Net<'a>> {
+        let sigmas_m = [plan_sigma_m, plan_sigma_m, self.radial_sigma_m];
+        let mut net = Net::new(used, &sigmas_m);
+        (!used.is_empty() && (0..4).all(|_| net.step(&sigmas_m))).then_some(net)
     }
 }
 
@@ -263,48 +284,15 @@ impl<'a> Net<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{
-        ellipsoid::on_ellipsoid_m,
-        surface::{SurfaceOptions, SurfaceShot, crossovers},
+    use crate::surface::{
+        SurfaceOptions, crossovers,
+        invented_profiles::{SLOPE, crossing, over_waves},
     };
-    use areograph_base::body::{Body, MARS_IAU2000};
 
     const PRIORS: ProfilePriors = ProfilePriors {
         radial_sigma_m: 1.0,
         plan_sigma_m: 70.0,
     };
-
-    /// Slope of the ground towards north.
-    const SLOPE: f64 = 0.01;
-
-    /// Straight profiles, every second one turned, `apart_m` from each other, on a slope, each recorded this much too
-    /// high.
-    fn crossing(shifts_m: &[f64], apart_m: f64) -> Vec<SurfaceShot> {
-        let radius_m = MARS_IAU2000.equatorial_radius_m;
-        let mut shots = Vec::new();
-        for (profile, shift_m) in shifts_m.iter().enumerate() {
-            let lean = if profile % 2 == 0 { 0.3 } else { -0.3 };
-            let middle_m = (profile as f64 - 0.5 * shifts_m.len() as f64) * apart_m;
-            for shot in -60..60 {
-                // Off the lattice of the other profiles.
-                let north_m = 301.0 * f64::from(shot) + 7.0 * profile as f64;
-                let east_m = middle_m + lean * north_m;
-                let up = crate::ellipsoid::spherical_to_xyz_m(
-                    east_m / radius_m,
-                    north_m / radius_m,
-                    1.0,
-                );
-                let height_m = SLOPE * north_m + shift_m;
-                shots.push(SurfaceShot {
-                    ground_m: on_ellipsoid_m(Body::Mars.model(), &up) + height_m * up,
-                    profile,
-                    attitude_known: true,
-                    off_nadir_rad: 0.0,
-                });
-            }
-        }
-        shots
-    }
 
     #[test]
     fn a_crossover_has_the_difference_the_place_and_the_slope_of_the_ground() {
@@ -342,7 +330,7 @@ mod tests {
         );
         assert!((only.above_m - 25.4).abs() < 0.5, "{only:?}");
         assert!(net.radial_sigma_m < 1.0, "{}", net.radial_sigma_m);
-        let shifts = net.shifts(&found, &PRIORS);
+        let shifts = net.shifts(&found, PRIORS.plan_sigma_m);
         assert_eq!(shifts.len(), 7);
         for shift in &shifts {
             let sigma_m = shift.covariance_m2[(2, 2)].sqrt();
@@ -352,35 +340,17 @@ mod tests {
         }
     }
 
-    /// Heights of waves in two directions, metres.
-    fn waves_m(east_m: f64, north_m: f64) -> f64 {
-        let along = |length_m: f64, x_m: f64| (std::f64::consts::TAU * x_m / length_m).sin();
-        30.0 * along(7_000.0, north_m) + 25.0 * along(5_000.0, east_m + 0.4 * north_m)
-    }
-
-    /// Crossing profiles over waves, one of them recorded this far to the east.
-    fn over_waves(number: usize, of: usize, aside_m: f64) -> Vec<SurfaceShot> {
-        let radius_m = MARS_IAU2000.equatorial_radius_m;
-        let mut shots = crossing(&vec![0.0; number], 800.0);
-        for shot in &mut shots {
-            let place = crate::ellipsoid::Spherical::from_xyz_m(&shot.ground_m);
-            let recorded_m = [place.longitude_rad, place.latitude.0].map(|angle| angle * radius_m);
-            let true_east_m = if shot.profile == of {
-                recorded_m[0] - aside_m
-            } else {
-                recorded_m[0]
-            };
-            let up = shot.ground_m.normalize();
-            let height_m = waves_m(true_east_m, recorded_m[1]);
-            shot.ground_m = on_ellipsoid_m(Body::Mars.model(), &up) + height_m * up;
-        }
-        shots
+    /// Shifts of ten profiles of which the fourth is recorded this far to the east, metres.
+    fn one_aside(aside_m: f64) -> [[f64; 2]; 10] {
+        let mut shifts_m = [[0.0; 2]; 10];
+        shifts_m[3][0] = aside_m;
+        shifts_m
     }
 
     #[test]
     fn a_misplaced_profile_is_left_out_and_only_that() {
         for (aside_m, expected) in [(1_200.0, Some(3)), (70.0, None)] {
-            let found = crossovers(&over_waves(10, 3, aside_m), &SurfaceOptions::default());
+            let found = crossovers(&over_waves(&one_aside(aside_m)), &SurfaceOptions::default());
             let net = ProfileNet::of(&found, &PRIORS);
             let left_out: Vec<usize> = net.left_out.iter().map(|of| of.profile).collect();
             assert_eq!(
@@ -401,6 +371,10 @@ mod tests {
         assert!(net.left_out.is_empty());
         // Each is shifted by more than was known beforehand.
         assert!(net.radial_sigma_m > 1.0, "{}", net.radial_sigma_m);
-        assert!(ProfileNet::of(&[], &PRIORS).shifts(&[], &PRIORS).is_empty());
+        assert!(
+            ProfileNet::of(&[], &PRIORS)
+                .shifts(&[], PRIORS.plan_sigma_m)
+                .is_empty()
+        );
     }
 }

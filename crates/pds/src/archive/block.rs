@@ -43,21 +43,52 @@ impl Block {
             last_s: f64::NEG_INFINITY,
             is_everywhere: false,
         };
-        let (mut longitude, mut western, mut eastern) = (None, i64::MAX, i64::MIN);
-        for record in records {
-            block.include(record);
-            let next = i64::from(record.ground_longitude_microdegrees.get());
-            // The shorter way from the preceding record.
-            let next = longitude.map_or(next, |before: i64| {
-                before + (next - before + TURN / 2).rem_euclid(TURN) - TURN / 2
-            });
-            longitude = Some(next);
-            (western, eastern) = (western.min(next), eastern.max(next));
-        }
+        let longitudes = longitudes(records.into_iter().inspect(|record| block.include(record)));
+        let western = longitudes.iter().copied().min().unwrap_or(i64::MAX);
+        let eastern = longitudes.iter().copied().max().unwrap_or(i64::MIN);
         let width = eastern.saturating_sub(western).clamp(0, TURN);
         block.west = u32::try_from(western.rem_euclid(TURN)).unwrap_or(0);
         block.width = u32::try_from(width).unwrap_or(u32::MAX);
         block
+    }
+
+    /// Width and height of a block that can be divided.
+    pub(super) fn size(&self) -> Option<[i64; 2]> {
+        let is_one =
+            !self.is_everywhere && i64::from(self.width) < TURN && self.south <= self.north;
+        let height = i64::from(self.north) - i64::from(self.south);
+        is_one.then_some([i64::from(self.width), height])
+    }
+
+    /// First and last time tag, ET seconds.
+    pub(super) const fn tags_s(&self) -> [f64; 2] {
+        [self.first_s, self.last_s]
+    }
+
+    /// Southern edge.
+    pub(super) const fn south(&self) -> i32 {
+        self.south
+    }
+
+    /// Largest latitude, without sign.
+    pub(super) fn latitude_max(&self) -> u32 {
+        self.south.unsigned_abs().max(self.north.unsigned_abs())
+    }
+
+    /// The part of its extent with these distances of its edges from the western and southern edge.
+    pub(super) fn part(&self, [first, last, lowest, highest]: [i64; 4]) -> Self {
+        let west = (i64::from(self.west) + first).rem_euclid(TURN);
+        let latitude = |north: i64| {
+            let latitude = i64::from(self.south) + north;
+            i32::try_from(latitude).unwrap_or(POLE).min(self.north)
+        };
+        Self {
+            west: u32::try_from(west).unwrap_or(0),
+            width: u32::try_from(last - first).unwrap_or(u32::MAX),
+            south: latitude(lowest),
+            north: latitude(highest),
+            ..*self
+        }
     }
 
     fn include(&mut self, record: &Record) {
@@ -102,6 +133,20 @@ impl Block {
         query.may_have_time(self.first_s, self.last_s)
             && (self.is_everywhere || query.windows.meets(&extent))
     }
+}
+
+/// Longitudes of the mid-points of successive records, each the shorter way from the preceding one.
+pub(super) fn longitudes<'a>(records: impl IntoIterator<Item = &'a Record>) -> Vec<i64> {
+    let mut before = None;
+    let records = records.into_iter().map(|record| {
+        let next = i64::from(record.ground_longitude_microdegrees.get());
+        let next = before.map_or(next, |before: i64| {
+            before + (next - before + TURN / 2).rem_euclid(TURN) - TURN / 2
+        });
+        before = Some(next);
+        next
+    });
+    records.collect()
 }
 
 #[cfg(test)]
@@ -153,7 +198,7 @@ mod tests {
     proptest! {
         #[test]
         fn a_block_matters_when_one_of_its_records_does(
-            records in proptest::collection::vec(record(), 1..20),
+            records in proptest::collection::vec(record(), 1..128),
             [west, width] in [0.0..2.0 * PI, 0.001..PI],
             [south, height] in [-0.5 * PI..0.5 * PI, 0.0..0.3_f64],
             time in proptest::option::of((-1e4..1e4_f64, 0.0..1e3_f64)),

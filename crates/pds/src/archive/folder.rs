@@ -146,7 +146,8 @@ fn is_pedr(path: &Path) -> bool {
 }
 
 /// The name of a compressed PEDR file without its compression suffix; `None` for any other file.
-fn decompressed(path: &Path) -> Option<OsString> {
+#[must_use]
+pub fn decompressed(path: &Path) -> Option<OsString> {
     let ending = path.extension()?.to_str()?;
     let stem = path.file_stem()?;
     let is_compressed = COMPRESSED

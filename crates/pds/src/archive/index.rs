@@ -17,6 +17,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     Query,
     block::{BLOCK_RECORDS, Block},
+    parts::Parts,
 };
 use crate::pedr::{Complaint, RULES};
 use areograph_base::body::Datum;
@@ -51,6 +52,9 @@ pub struct IndexedFile {
     pub(super) complaints: Vec<Complaint>,
     /// Extents of its blocks; `None` for a file with too many faults, which is read as a whole.
     pub(super) blocks: Option<Vec<Block>>,
+    /// Parts of these blocks, in a stand-in; none in an index.
+    #[serde(skip)]
+    pub(super) parts: Vec<Parts>,
 }
 
 /// The form of the index in its file.
@@ -80,6 +84,17 @@ impl IndexedFile {
         blake3::Hash::from_bytes(self.blake3).to_hex().to_string()
     }
 
+    /// The entry in the form of stand-ins; `None` if it cannot be encoded.
+    pub(super) fn encode(&self) -> Option<Vec<u8>> {
+        postcard::to_stdvec(&(self, &self.parts)).ok()
+    }
+
+    /// The entry in a stand-in; `None` if it is of a different version.
+    pub(super) fn decode(bytes: &[u8]) -> Option<Self> {
+        let (entry, parts): (Self, Vec<Parts>) = postcard::from_bytes(bytes).ok()?;
+        Some(Self { parts, ..entry })
+    }
+
     /// The blocks of a file with this number of records.
     fn blocks_of(&self, records: usize) -> Option<&[Block]> {
         let blocks = self.blocks.as_deref();
@@ -89,6 +104,12 @@ impl IndexedFile {
     /// Whether the entry holds the extents of the file's records and their faults.
     pub(super) fn has_blocks(&self, records: usize) -> bool {
         self.blocks_of(records).is_some()
+    }
+
+    /// First and last time tag of the file's records, ET seconds, if the entry holds their extents.
+    pub(super) fn tags_s(&self, records: usize) -> Option<[f64; 2]> {
+        let blocks = self.blocks_of(records)?.iter().map(Block::tags_s);
+        blocks.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
     }
 
     /// Rows of the file, out of its number of rows, that may contain requested shots; `None` if the index cannot
@@ -101,12 +122,18 @@ impl IndexedFile {
     ) -> Option<Vec<Range<usize>>> {
         let blocks = self.blocks_of(records)?;
         let mut rows: Vec<Range<usize>> = Vec::new();
-        for (start, block) in (0..records).step_by(BLOCK_RECORDS).zip(blocks) {
-            if block.may_matter(query, datum) {
-                let end = records.min(start + BLOCK_RECORDS);
+        let undivided = Parts::default();
+        for (number, block) in blocks.iter().enumerate() {
+            if !block.may_matter(query, datum) {
+                continue;
+            }
+            let start = number * BLOCK_RECORDS;
+            let of_block = start..records.min(start + BLOCK_RECORDS);
+            let parts = self.parts.get(number).unwrap_or(&undivided);
+            for near in parts.near(block, of_block, query, datum) {
                 match rows.last_mut() {
-                    Some(last) if last.end == start => last.end = end,
-                    _ => rows.push(start..end),
+                    Some(last) if last.end == near.start => last.end = near.end,
+                    _ => rows.push(near),
                 }
             }
         }
@@ -169,7 +196,7 @@ impl Index {
     pub fn find(&self, path: &Path, identity: &Identity) -> Option<Arc<IndexedFile>> {
         let found = self.files.get(path);
         found
-            .filter(|file| file.identity == *identity)
+            .filter(|file| file.identity.is_same_file(identity))
             .map(Arc::clone)
     }
 }

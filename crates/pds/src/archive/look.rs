@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::{Query, Source};
 use crate::pedr::Stretch;
 use areograph_base::error::{Result, Stopped};
+use areograph_store::files::stand_in::elsewhere;
 
 /// Records that a thread examines at a time: 0.4 MB, which fit into the cache of a processor core.
 const LOOK_RECORDS: usize = 512;
@@ -20,6 +21,10 @@ impl Source {
     /// A read error; a file that has changed; [`Stopped`].
     pub(super) fn look(&self, query: &Query<'_>, stop: &AtomicBool) -> Result<Vec<Range<usize>>> {
         let reader = self.reopen()?;
+        if let Some(part) = reader.part(&(0..self.records())) {
+            let failed = elsewhere()?.bring(&[part], stop).pop();
+            failed.map_or(Ok(()), |(_, failure)| Err(failure))?;
+        }
         let starts: Vec<usize> = (0..self.records()).step_by(LOOK_RECORDS).collect();
         let found: Result<Vec<Looked>> = starts
             .into_par_iter()

@@ -12,7 +12,11 @@
 //! The index (`index.rs`) holds the extents of blocks of 128 records, complaints, and identity and hash of each file.
 //! It is trusted only for unchanged files, and for records checked by the same rules (`pedr::RULES`), so that results
 //! do not depend on it.
+//!
+//! A file may be on a server: its stand-in (`store/files/stand_in.rs`) contains its index entry, and the search brings
+//! the bytes of all its pieces at once.
 
+mod apart;
 mod block;
 mod distinct;
 mod folder;
@@ -21,16 +25,19 @@ mod index;
 mod indexing;
 mod look;
 mod opened;
+mod parts;
 mod query;
 mod scan;
 mod search;
 mod source;
 mod tables;
 
+pub use apart::apart;
 pub use distinct::{Copies, Repetition, SAME_SHOT_S, Seen, Span, TableRows, spans};
-pub use folder::Listing;
+pub use folder::{Listing, decompressed};
 pub use found::{Found, ShotRejection, WindowLists};
 pub use index::{INDEX, INDEX_MARK, Index, IndexedFile, Indexes};
+pub use indexing::stand_in;
 pub use opened::Opened;
 pub use query::{Judged, Query};
 pub use search::{Sink, UNUSABLE_MAX, UNUSABLE_SHARE_MAX, search};

@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use super::{Found, Query, Source, scan::Scan};
 use crate::pedr::{Complaint, RECORD_BYTES, Reader, Stretch};
 use areograph_base::error::{Cause, Error, Kind, Result, Stopped};
+use areograph_store::files::stand_in::{Part, elsewhere};
 
 /// Records in memory at once: 51 MB, more than any day of the mission.
 pub(super) const LOAD_RECORDS: usize = 1 << 16;
@@ -224,6 +225,8 @@ impl Search<'_> {
     fn load(&mut self, pieces: &[Piece]) -> Result<()> {
         Stopped::check(self.stop)?;
         let mut failures = self.open(pieces);
+        self.bring(pieces, &mut failures);
+        Stopped::check(self.stop)?;
         let stretches = self.read(pieces, &mut failures);
         let tasks: Vec<Task> = (0..)
             .zip(pieces)
@@ -285,6 +288,27 @@ impl Search<'_> {
         failures
     }
 
+    /// Brings the pieces of files on servers to this computer, all at once.
+    fn bring(&self, pieces: &[Piece], failures: &mut BTreeMap<usize, Error>) {
+        let part = |piece: &Piece| {
+            let reader = self.readers.get(&piece.file)?;
+            let part = reader.part(&piece.rows).filter(|_| !piece.rows.is_empty());
+            Some((piece.file, part?))
+        };
+        let (files, parts): (Vec<usize>, Vec<Part<'_>>) = pieces.iter().filter_map(part).unzip();
+        if parts.is_empty() {
+            return;
+        }
+        let failed = match elsewhere() {
+            Ok(reader) => reader.bring(&parts, self.stop),
+            // Reading them states the reason.
+            Err(_) => Vec::new(),
+        };
+        for (part, failure) in failed {
+            failures.entry(files[part]).or_insert(failure);
+        }
+    }
+
     /// Reads the pieces; `None` for pieces of failed files.
     fn read(
         &mut self,
@@ -296,12 +320,15 @@ impl Search<'_> {
             .chain(iter::repeat_with(Vec::new))
             .take(pieces.len())
             .collect();
-        let readers = &self.readers;
+        let (readers, failed) = (&self.readers, &*failures);
         let stretches: Vec<Option<Result<Stretch>>> = pieces
             .par_iter()
             .zip(buffers)
             .map(|(piece, buffer)| {
                 let reader = readers.get(&piece.file)?;
+                if failed.contains_key(&piece.file) {
+                    return None;
+                }
                 Some(reader.stretch(piece.rows.clone(), buffer))
             })
             .collect();

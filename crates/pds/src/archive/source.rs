@@ -12,10 +12,16 @@ use crate::pedr::{Complaint, FieldGuard, PedrLabel, Reader, decide_datum};
 use areograph_base::{
     altimetry::DatumChoice,
     body::Datum,
-    error::{Locate, Result},
+    error::{Cause, Locate, Result},
     footprints::SourceFile,
 };
 use areograph_store::files::{Identity, file_name};
+
+/// A stand-in with an entry of another version.
+#[derive(Debug, thiserror::Error, Cause)]
+#[error("the file on the server was indexed by a different version of areograph")]
+#[cause(Input: "run `areograph pedr index URL --verify` again with the same folder")]
+struct OtherEntry;
 
 /// A file and the interpretation of its records.
 #[derive(Debug, Clone)]
@@ -43,7 +49,13 @@ impl Source {
     /// A file that cannot be read, contains no valid record, or whose datum is unknown.
     pub fn open(path: &Path, choice: DatumChoice, indexes: &Indexes) -> Result<Self> {
         let reader = Reader::open(path)?;
-        let indexed = indexes.find(path, &reader.identity());
+        let indexed = match reader.stated_entry() {
+            Some(entry) => {
+                let entry = IndexedFile::decode(entry).ok_or(OtherEntry).in_file(path)?;
+                Some(Arc::new(entry))
+            }
+            None => indexes.find(path, &reader.identity()),
+        };
         let first_s = reader.require_records()?;
         let head = reader.head();
         let version = head.name().map(|name| name.version);
@@ -109,6 +121,19 @@ impl Source {
     #[must_use]
     pub const fn first_s(&self) -> f64 {
         self.first_s
+    }
+
+    /// BLAKE3 of its bytes, hexadecimal, as its index or stand-in states; `None` without one.
+    #[must_use]
+    pub fn blake3(&self) -> Option<String> {
+        self.indexed.as_ref().map(|indexed| indexed.blake3())
+    }
+
+    /// First and last time tag of its records, ET seconds; without the extents of an index, it may contain any time.
+    pub(super) fn tags_s(&self) -> [f64; 2] {
+        let indexed = self.indexed.as_ref();
+        let tags_s = indexed.and_then(|indexed| indexed.tags_s(self.records));
+        tags_s.unwrap_or([f64::NEG_INFINITY, f64::INFINITY])
     }
 
     /// Complaints about its label.

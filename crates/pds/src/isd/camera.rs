@@ -8,7 +8,7 @@
 use nalgebra::{Matrix2, Matrix3, Vector2};
 
 use super::{
-    CALIBRATED_BY, VALID,
+    APPLIED, CALIBRATED_BY, VALID,
     document::{IsdError, Object},
 };
 use areograph_base::{
@@ -285,5 +285,6 @@ fn calibration(document: &Object<'_>) -> Result<Option<Calibrated>, IsdError> {
         calibration: origin.text("calibration")?.to_owned(),
         camera: origin.text("camera")?.to_owned(),
         valid: origin.has("verdict") && origin.text("verdict")? == VALID,
+        is_of_other_orbit: origin.has(APPLIED) && origin.any(APPLIED)?.as_bool() == Some(true),
     }))
 }

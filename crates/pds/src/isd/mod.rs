@@ -57,6 +57,8 @@ const SUMMING_MAX: u32 = 1_000;
 pub const CALIBRATED_BY: &str = "areograph_calibration";
 /// The verdict of a calibration whose cameras can be used.
 pub const VALID: &str = "valid";
+/// Member of the calibration: whether it was determined in another orbit than that of the image.
+pub const APPLIED: &str = "is_of_other_orbit";
 /// Line scanners, the only supported cameras.
 pub(crate) const LINE_SCANNER: &str = "USGS_ASTRO_LINE_SCANNER_SENSOR_MODEL";
 /// Ephemeris times, seconds: five centuries around J2000.

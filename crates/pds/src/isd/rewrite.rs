@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 use serde_json::{Value, json};
 
 use super::{
-    CALIBRATED_BY, SupportSource,
+    APPLIED, CALIBRATED_BY, SupportSource,
     document::{IsdError, Object},
 };
 use areograph_base::{error::Result, instruments::TRANSVERSE_TERMS, units::METRES_PER_KM};
@@ -63,13 +63,14 @@ const CAMERA_KEYS: [&str; 7] = [
 ];
 /// Beginnings of notes on the camera.
 const CAMERA_NOTES: [&str; 2] = ["optical_distortion", "detector coordinates"];
-/// The mounting, and the frames that it leads from and to.
 const POINTING: &str = "instrument_pointing";
-const MOUNTING_KEYS: [&str; 2] = ["constant_rotation", "constant_frames"];
+/// The mounting, and the frames that it leads from and to, which support data may omit.
+const MOUNTING: &str = "constant_rotation";
+const FRAMES: &str = "constant_frames";
 
 impl SupportSource<'_> {
     /// The support data with the camera of others, which are of the same line: mounting, optics, detector line, distortion and
-    /// the name of its calibration.
+    /// the name of its calibration, which is then of another orbit.
     ///
     /// # Errors
     /// A file cannot be read; JSON that is not support data; support data that lack a key of the camera.
@@ -94,8 +95,10 @@ impl SupportSource<'_> {
             };
             notes.retain(|note| !is_of_camera(note));
         }
-        for key in MOUNTING_KEYS {
-            support[POINTING][key] = other.located(pointing.any(key))?.clone();
+        support[CALIBRATED_BY][APPLIED] = json!(true);
+        support[POINTING][MOUNTING] = other.located(pointing.any(MOUNTING))?.clone();
+        if pointing.has(FRAMES) {
+            support[POINTING][FRAMES] = other.located(pointing.any(FRAMES))?.clone();
         }
         self.located(pretty(&support))
     }

@@ -12,6 +12,7 @@ use super::{
     Complaint, FieldGuard, FileName, LABEL_BYTES, LABEL_RECORDS, PedrLabel, RECORD_BYTES, Reason,
     Record, RecordError,
     chronology::{Misplaced, in_order, misplaced},
+    elsewhere::Head,
     foreign::{Foreign, label_records},
 };
 use areograph_base::error::{Cause, Error, IoError, Locate, Result};
@@ -107,6 +108,21 @@ impl File {
         file
     }
 
+    /// A file of `length` bytes on a server, whose head is known.
+    pub(super) fn of_head(head: Head, length: u64, path: PathBuf) -> Self {
+        Self {
+            name: FileName::parse(&path),
+            path,
+            bytes: Vec::new(),
+            length,
+            first_row: 0,
+            label: head.label,
+            label_records: head.label_records,
+            label_complaints: head.label_complaints,
+            misplaced: OnceLock::new(),
+        }
+    }
+
     /// The file with the records from row `first_row` on in memory: `bytes` contains them after as many bytes as
     /// the label has. The chronology is `misplaced`, or else follows from the records in memory.
     pub(super) fn with_records(
@@ -125,6 +141,16 @@ impl File {
             label_records: self.label_records,
             label_complaints: Vec::new(),
             misplaced: misplaced.map_or_else(OnceLock::new, OnceLock::from),
+        }
+    }
+
+    /// Its head, with the time of its first valid record.
+    pub(super) fn as_head(&self, first_s: f64) -> Head {
+        Head {
+            label: self.label.clone(),
+            label_records: self.label_records,
+            label_complaints: self.label_complaints.clone(),
+            first_s,
         }
     }
 

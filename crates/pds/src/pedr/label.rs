@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use serde::{Deserialize, Serialize};
+
 use super::{LABEL_BYTES, LABEL_RECORDS, RECORD_BYTES};
 use crate::label::{Label, LabelError, parse};
 use areograph_base::{altimetry::DatumChoice, body::Datum, error::Cause};
@@ -42,7 +44,7 @@ impl FileName {
 }
 
 /// Contents of the attached label; any may be missing.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct PedrLabel {
     /// Version of the software that made the file.
     pub software_version: Option<f64>,

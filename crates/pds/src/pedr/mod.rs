@@ -9,6 +9,7 @@ mod check;
 mod chronology;
 mod complaint;
 mod counts;
+mod elsewhere;
 mod encode;
 mod fault;
 mod file;
@@ -23,6 +24,7 @@ mod quantity;
 mod reader;
 mod record;
 mod shots;
+mod stretch;
 mod writer;
 
 pub use complaint::Complaint;
@@ -34,9 +36,10 @@ pub use frame_values::{EncodeError, FrameValues};
 pub use label::{FileName, PedrLabel, decide_datum};
 pub use mid_point::MidPoint;
 pub use quantity::Quantity;
-pub use reader::{Reader, Stretch};
+pub use reader::Reader;
 pub use record::{RECORD_BYTES, Record};
 pub use shots::SpoiledShots;
+pub use stretch::Stretch;
 pub use writer::{LabelInfo, PedrWriter};
 
 use areograph_base::units::RADIANS_PER_DEGREE;

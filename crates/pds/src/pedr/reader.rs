@@ -15,16 +15,16 @@ use std::{
 
 use rayon::prelude::*;
 use rustix::fs::Advice;
-use zerocopy::IntoBytes as _;
 
 use super::{
-    Complaint, FieldGuard, File, Frame, LABEL_BYTES, RECORD_BYTES, Record, RecordError,
-    chronology::{in_order, misplaced},
-    file::Chronology,
-    neighbours::NEIGHBOURS,
+    File, LABEL_BYTES, RECORD_BYTES, chronology::misplaced, elsewhere::Note, file::Chronology,
+    neighbours::NEIGHBOURS, stretch::Stretch,
 };
 use areograph_base::error::{Cause, IoError, Locate, Result};
-use areograph_store::files::Identity;
+use areograph_store::files::{
+    Identity,
+    stand_in::{Part, StandIn, elsewhere},
+};
 
 /// Records that are searched for the first valid one.
 const FIRST_RECORDS: usize = 16;
@@ -42,17 +42,20 @@ const READ_BYTES: usize = 1 << 20;
 pub struct Reader {
     handle: fs::File,
     identity: Identity,
+    /// Bytes of the file.
+    length: u64,
+    /// The file on a server for which the open file stands.
+    elsewhere: Option<Remote>,
     head: File,
     /// Records outside the chronology of the file, once known.
     misplaced: OnceLock<Chronology>,
 }
 
-/// Successive records of a file, with neighbours to check them by.
+/// A file on a server.
 #[derive(Debug)]
-pub struct Stretch {
-    file: File,
-    /// Rows of the stretch itself; their neighbours are in memory as well.
-    inner: Range<usize>,
+struct Remote {
+    file: StandIn,
+    note: Note,
 }
 
 /// A file that has changed since it was opened.
@@ -86,18 +89,99 @@ impl Reader {
     /// # Errors
     /// As [`File::open`].
     pub fn open(path: &Path) -> Result<Self> {
-        let handle = super::file::open_regular(path)?;
+        Self::open_as(path, path)
+    }
+
+    /// Opens a file that is at `place` under a temporary name; `path` is its name in messages.
+    ///
+    /// # Errors
+    /// As [`File::open`].
+    pub fn open_as(place: &Path, path: &Path) -> Result<Self> {
+        let handle = super::file::open_regular(place)?;
         let metadata = handle.metadata();
         let metadata = metadata.map_err(IoError::on("look at")).in_file(path)?;
         let identity = Identity::of(&metadata);
         let mut label = vec![0; LABEL_BYTES.min(usize::try_from(identity.bytes).unwrap_or(0))];
         read_at(&handle, &mut label, 0, identity.bytes).in_file(path)?;
+        let stand_in = if StandIn::begins(&label) {
+            StandIn::of_open(&handle).in_file(path)?
+        } else {
+            None
+        };
+        let Some(file) = stand_in else {
+            return Ok(Self {
+                handle,
+                identity,
+                length: identity.bytes,
+                elsewhere: None,
+                head: File::of_length(label, identity.bytes, path.to_owned()),
+                misplaced: OnceLock::new(),
+            });
+        };
+        let note = Note::of(&file, path)?;
+        let length = file.bytes();
         Ok(Self {
             handle,
             identity,
-            head: File::of_length(label, identity.bytes, path.to_owned()),
+            length,
+            head: File::of_head(note.head.clone(), length, path.to_owned()),
+            elsewhere: Some(Remote { file, note }),
             misplaced: OnceLock::new(),
         })
+    }
+
+    /// The note of a stand-in of this file, with its entry in an index; `None` if it cannot be encoded.
+    ///
+    /// # Errors
+    /// A file without a valid record; one that cannot be read.
+    pub fn note(&self, entry: Vec<u8>) -> Result<Option<Vec<u8>>> {
+        let first_s = self.require_records()?;
+        Ok(Note::encoded(self.head.as_head(first_s), entry))
+    }
+
+    /// The entry of a file on a server in an index, as its stand-in has it.
+    #[must_use]
+    pub fn stated_entry(&self) -> Option<&[u8]> {
+        self.elsewhere.as_ref().map(|remote| &*remote.note.entry)
+    }
+
+    /// BLAKE3 of the file, if it is on a server: its stand-in has it, and every byte that is read is verified.
+    #[must_use]
+    pub fn stated_blake3(&self) -> Option<String> {
+        self.elsewhere.as_ref().map(|remote| remote.file.blake3())
+    }
+
+    /// The bytes of some rows with their neighbours, if they are on a server.
+    #[must_use]
+    pub fn part(&self, rows: &Range<usize>) -> Option<Part<'_>> {
+        let remote = self.elsewhere.as_ref()?;
+        let rows = self.with_neighbours(rows);
+        let byte = |row: usize| (self.head.label_length() + row * RECORD_BYTES) as u64;
+        Some(Part {
+            path: self.head.path(),
+            file: &remote.file,
+            bytes: byte(rows.start)..byte(rows.end),
+        })
+    }
+
+    /// Rows and their neighbours, as far as the file has them.
+    fn with_neighbours(&self, rows: &Range<usize>) -> Range<usize> {
+        let end = rows.end.min(self.head.record_count());
+        let start = rows.start.min(end);
+        start.saturating_sub(NEIGHBOURS)..(end + NEIGHBOURS).min(self.head.record_count())
+    }
+
+    /// Fills `buffer` from the byte `from` of the file.
+    fn read_at(&self, buffer: &mut [u8], from: u64) -> Result<()> {
+        let Some(remote) = &self.elsewhere else {
+            return read_at(&self.handle, buffer, from, self.length);
+        };
+        let part = Part {
+            path: self.head.path(),
+            file: &remote.file,
+            bytes: from..from + buffer.len() as u64,
+        };
+        elsewhere()?.read(&part, buffer)
     }
 
     /// The file without its records: name, label, and their faults.
@@ -159,9 +243,9 @@ impl Reader {
     ) -> Result<Stretch> {
         let end = rows.end.min(self.head.record_count());
         let start = rows.start.min(end);
-        let first_row = start.saturating_sub(NEIGHBOURS);
-        let last_row = (end + NEIGHBOURS).min(self.head.record_count());
-        let buffer = self.read(first_row..last_row, buffer)?;
+        let near = self.with_neighbours(&(start..end));
+        let first_row = near.start;
+        let buffer = self.read(near, buffer)?;
         Ok(Stretch {
             file: self.head.with_records(first_row, buffer, chronology),
             inner: start..end,
@@ -176,7 +260,7 @@ impl Reader {
         let parts = buffer[label..].par_chunks_mut(READ_BYTES);
         let read = |(number, part): (usize, &mut [u8])| {
             let from = from + (number * READ_BYTES) as u64;
-            read_at(&self.handle, part, from, self.identity.bytes)
+            self.read_at(part, from)
         };
         let read = parts.enumerate().try_for_each(read);
         read.in_file(self.head.path())?;
@@ -212,20 +296,23 @@ impl Reader {
     /// A read error; a file that has become shorter, has changed or lost its name.
     fn whole(&self) -> Result<File> {
         let path = self.head.path();
-        let length = usize::try_from(self.identity.bytes).unwrap_or(usize::MAX);
+        let length = usize::try_from(self.length).unwrap_or(usize::MAX);
         let mut bytes = Vec::new();
         bytes
             .try_reserve_exact(length)
             .map_err(|_| IoError::on("read")(io::ErrorKind::OutOfMemory.into()))
             .in_file(path)?;
         bytes.resize(length, 0);
-        read_at(&self.handle, &mut bytes, 0, self.identity.bytes).in_file(path)?;
+        self.read_at(&mut bytes, 0).in_file(path)?;
         self.unchanged()?;
         Ok(File::from_bytes(bytes, path))
     }
 
     /// Requests read-ahead of the file; the system may ignore it.
     pub fn announce(&self) {
+        if self.elsewhere.is_some() {
+            return;
+        }
         let _ = rustix::fs::fadvise(&self.handle, 0, None, Advice::WillNeed);
     }
 
@@ -280,9 +367,9 @@ impl Reader {
     /// A read error; a file that has become shorter.
     pub fn trailing_bytes(&self) -> Result<Vec<u8>> {
         let from = (self.head.label_length() + self.head.record_count() * RECORD_BYTES) as u64;
-        let length = self.identity.bytes.saturating_sub(from);
+        let length = self.length.saturating_sub(from);
         let mut bytes = vec![0; usize::try_from(length).unwrap_or(0)];
-        read_at(&self.handle, &mut bytes, from, self.identity.bytes).in_file(self.head.path())?;
+        self.read_at(&mut bytes, from).in_file(self.head.path())?;
         Ok(bytes)
     }
 
@@ -291,6 +378,9 @@ impl Reader {
     /// # Errors
     /// The fault of the label, otherwise of the first record; a read error.
     pub fn require_records(&self) -> Result<f64> {
+        if let Some(remote) = &self.elsewhere {
+            return Ok(remote.note.head.first_s);
+        }
         let (mut row, mut next, mut first) = (0, FIRST_RECORDS, None);
         while row < self.head.record_count() {
             // One of the valid records fits into any chronology.
@@ -302,60 +392,6 @@ impl Reader {
             (row, next) = (row + next, NEXT_RECORDS);
         }
         Err(self.head.no_good_record(first))
-    }
-}
-
-impl Stretch {
-    /// Records of the rows `rows` of the stretch, with their rows.
-    pub fn records(&self, rows: Range<usize>) -> impl Iterator<Item = (usize, &Record)> {
-        self.about(rows).map(|row| (row, self.file.record(row)))
-    }
-
-    /// The frames of the rows `rows` of the stretch, with their rows: each is checked with its neighbours, which cost
-    /// less the more rows are requested at once.
-    pub fn frames(
-        &self,
-        rows: Range<usize>,
-        guard: FieldGuard,
-    ) -> impl Iterator<Item = (usize, std::result::Result<Frame<'_>, RecordError>)> {
-        self.file.frames(self.about(rows), guard)
-    }
-
-    /// The complaint about the record in row `row` of the file.
-    #[must_use]
-    pub fn complaint(&self, row: usize, error: &RecordError) -> Complaint {
-        self.file.record_complaint(row, error)
-    }
-
-    /// Number of the record in row `row` of the file.
-    #[must_use]
-    pub fn record_number(&self, row: usize) -> u32 {
-        self.file.record_number(row)
-    }
-
-    /// Whether the records, and their neighbours in memory, follow each other in time without sharing a shot.
-    #[must_use]
-    pub fn is_in_order(&self) -> bool {
-        in_order(self.file.records().iter().map(|record| record.time_s.get()))
-    }
-
-    /// The rows that belong to the stretch itself.
-    fn about(&self, rows: Range<usize>) -> Range<usize> {
-        let start = rows.start.clamp(self.inner.start, self.inner.end);
-        start..rows.end.clamp(start, self.inner.end)
-    }
-
-    /// The bytes of the records of the stretch itself.
-    #[must_use]
-    pub fn bytes(&self) -> &[u8] {
-        let first = self.inner.start - self.file.rows().start;
-        self.file.records()[first..first + self.inner.len()].as_bytes()
-    }
-
-    /// The buffer, for the next stretch.
-    #[must_use]
-    pub fn into_buffer(self) -> Vec<u8> {
-        self.file.into_bytes()
     }
 }
 

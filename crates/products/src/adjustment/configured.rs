@@ -9,7 +9,9 @@ use areograph_base::{
     footprints::{AdjustmentModel, FootprintImageCoordinates},
     schema::{all_positive, none_negative},
 };
-use areograph_config::{AdjustmentConfig, OrientationPrior, PositionUnknowns, RotationUnknowns};
+use areograph_config::{
+    AdjustmentConfig, OrientationPrior, PositionUnknowns, ReliefForPlan, RotationUnknowns,
+};
 use areograph_geom::robust::RobustWeight;
 
 /// [`AdjustmentConfig`] without unset keys.
@@ -47,7 +49,7 @@ pub(super) struct AdjustmentKeys<'a> {
     position_unknowns: PositionUnknowns,
     rotation_unknowns: RotationUnknowns,
     orbit_of_pedr: bool,
-    relief_for_plan: bool,
+    relief_for_plan: ReliefForPlan,
     attitude_clock: bool,
     #[schemars(extend("exclusiveMinimum" = 0))]
     attitude_clock_sigma_s: f64,

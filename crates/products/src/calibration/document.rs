@@ -14,7 +14,7 @@ use areograph_config::CalibrationMode;
 use areograph_geom::calibration::{AngleCombination, TieSight};
 use areograph_stages::{
     calibrate::{
-        CalibrationRound, CalibrationStep, CameraResult, HeldBack, PixelsAndMetres, Rounds,
+        CalibrationRound, CalibrationStep, CameraResult, HeldBack, Looks, PixelsAndMetres, Rounds,
         Scatter, TieGround, ValidationResult, Value,
     },
     judge::Verdict,
@@ -59,6 +59,8 @@ struct Document<'a> {
     /// Drift of the orbit, body-fixed, metres per image line: estimated true orbit minus orbit in the given support
     /// data. The offset angles absorb the constant part of the orbit error.
     drift_m_per_line: [Value; 3],
+    /// Look directions of all lines, compared by `areograph calibrate series`.
+    looks: &'a Looks,
     /// Offset angles determined from tie points only.
     tie_sight: TieSightDocument,
     /// Test of the heights of tie points against the ground between laser points; absent if none could be tested.
@@ -213,6 +215,7 @@ impl<'a> Document<'a> {
             verdict: &result.verdict,
             cameras: result.cameras.iter().map(camera).collect(),
             drift_m_per_line: result.drift_m_per_line,
+            looks: &result.looks,
             tie_sight: tie_sight(&result.tie_sight),
             tie_ground: result.tie_ground,
             steps: &result.steps,

@@ -4,6 +4,7 @@ mod document;
 mod images;
 mod model;
 mod points;
+mod read;
 
 use std::path::Path;
 
@@ -20,6 +21,7 @@ use areograph_pds::isd::{CALIBRATED_BY, VALID};
 use areograph_stages::calibrate::{Calibration, CameraResult};
 
 pub use model::CalibrationModel;
+pub use read::{PublishedCalibration, PublishedLine};
 
 /// Placeholder of a camera in paths.
 const CAMERA: &str = "<camera>";

@@ -236,31 +236,51 @@ fn polynomials<'a>() -> Vec<Column<&'a ImageRow>> {
                 result(
                     concat!("order", $order, "_y_rmse_m"),
                     Unit::Metre,
-                    concat!("the same of Y, ", $words, " order"),
+                    concat!(
+                        "root mean square residual of Y about the polynomial of ",
+                        $words,
+                        " order"
+                    ),
                     |of| Some(of.rmse[$place].position_m[1]),
                 ),
                 result(
                     concat!("order", $order, "_z_rmse_m"),
                     Unit::Metre,
-                    concat!("the same of Z, ", $words, " order"),
+                    concat!(
+                        "root mean square residual of Z about the polynomial of ",
+                        $words,
+                        " order"
+                    ),
                     |of| Some(of.rmse[$place].position_m[2]),
                 ),
                 result(
                     concat!("order", $order, "_omega_rmse_arcsec"),
                     Unit::Arcsecond,
-                    concat!("the same of ω, ", $words, " order"),
+                    concat!(
+                        "root mean square residual of ω about the polynomial of ",
+                        $words,
+                        " order"
+                    ),
                     |of| Some(of.rmse[$place].angles_rad[0] / RADIANS_PER_ARCSECOND),
                 ),
                 result(
                     concat!("order", $order, "_phi_rmse_arcsec"),
                     Unit::Arcsecond,
-                    concat!("the same of φ, ", $words, " order"),
+                    concat!(
+                        "root mean square residual of φ about the polynomial of ",
+                        $words,
+                        " order"
+                    ),
                     |of| Some(of.rmse[$place].angles_rad[1] / RADIANS_PER_ARCSECOND),
                 ),
                 result(
                     concat!("order", $order, "_kappa_rmse_arcsec"),
                     Unit::Arcsecond,
-                    concat!("the same of κ, ", $words, " order"),
+                    concat!(
+                        "root mean square residual of κ about the polynomial of ",
+                        $words,
+                        " order"
+                    ),
                     |of| Some(of.rmse[$place].angles_rad[2] / RADIANS_PER_ARCSECOND),
                 ),
             ]

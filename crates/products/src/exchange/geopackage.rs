@@ -130,7 +130,7 @@ fn create_table(layer: &Layer) -> String {
             Kind::Natural | Kind::Integer => "INTEGER",
             Kind::Flag => "BOOLEAN",
             Kind::Time => "DATETIME",
-            Kind::Text => "TEXT",
+            Kind::Text | Kind::List => "TEXT",
             Kind::Bytes => "BLOB",
         };
         let missing = if column.optional { "" } else { " NOT NULL" };

@@ -255,7 +255,7 @@ fn dbase_fields(table: &Table) -> impl Iterator<Item = DbaseField> {
 fn text_widths(table: &Table) -> Result<Vec<Option<u8>>> {
     let mut widths = vec![None; table.columns().count()];
     for (width, column) in widths.iter_mut().zip(table.columns()) {
-        *width = matches!(column.kind, Kind::Text | Kind::Time).then_some(1);
+        *width = matches!(column.kind, Kind::Text | Kind::List | Kind::Time).then_some(1);
     }
     for rows in table.pieces() {
         for (width, values) in widths.iter_mut().zip(texts(table.values(rows)?)) {

@@ -87,9 +87,10 @@ fn quality<'a>() -> Vec<Column<Shot<'a>>> {
             u32::from(shot.get(|footprints| &footprints.channel))
         }),
         column(
-            "class",
+            // Not `class`: a reserved word in Python.
+            "return_class",
             Unit::None,
-            "classification: 1 ground, 0 cloud or noise",
+            "class of the return: 1 ground, 0 cloud or noise",
             |shot: &Shot| i32::from(shot.get(|footprints| &footprints.class)),
         ),
         column(
@@ -106,9 +107,10 @@ fn quality<'a>() -> Vec<Column<Shot<'a>>> {
         ),
         text_column(
             "windows",
-            "identifiers of the windows that contain the shot, separated by semicolons",
+            "identifiers of the windows that contain the shot: a list in Parquet, separated by semicolons in text",
             |shot: &Shot, out| shot.names.write_windows(shot.row, out),
         )
+        .listed()
         .last_in_gis(),
     ]
 }

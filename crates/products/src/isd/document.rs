@@ -82,6 +82,8 @@ pub(super) struct CalibratedBy<'a> {
     pub(super) camera: &'a str,
     /// `valid` or `invalid`.
     pub(super) verdict: &'static str,
+    /// Whether the calibration was determined in another orbit than that of the image.
+    pub(super) is_of_other_orbit: bool,
 }
 
 /// Range of heights in which camera models search for the ground.

@@ -4,7 +4,7 @@ use super::WriteMatch;
 use crate::{
     coordinates::{degrees, signed_longitude_deg},
     product::{Content, Declaration, Role},
-    table::{Column, Table, Unit, column, meanings},
+    table::{Column, Meaning, Table, Unit, column, meanings},
     text_table,
 };
 use areograph_base::units::wrap_two_pi;
@@ -16,10 +16,20 @@ pub(super) static CONTROL: Declaration<WriteMatch> = Declaration {
     readers: "areograph calibrate",
     rows: "image positions",
     role: Role::Data,
-    content: Content::Table(|| meanings(&columns())),
-    write: |path, of| text_table::write(path, Table::new(columns(), rows(of.result))),
+    content: Content::Table(meaning),
+    write: |path, of| text_table::write(path, table(of.result)),
     uses: &[],
 };
+
+/// The table of the control points of a match.
+pub(crate) fn table(of: &LaserMatch) -> Table<'_> {
+    Table::new(columns(), rows(of))
+}
+
+/// Meanings of its columns.
+pub(crate) fn meaning() -> Vec<Meaning> {
+    meanings(&columns())
+}
 
 /// A point in an image.
 struct Row<'a> {

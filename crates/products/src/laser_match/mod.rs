@@ -1,8 +1,10 @@
-//! Products of matching laser profiles with a terrain model: units, control points, the table that calibrations read,
-//! the report.
+//! Products of matching laser profiles with a terrain model: units, control points, elevation curves, the table
+//! that calibrations read, the report.
 
-mod control;
+pub(super) mod control;
+pub(super) mod curves;
 mod points;
+pub(super) mod score_maps;
 pub(super) mod units;
 
 use std::path::Path;
@@ -34,6 +36,8 @@ static PRODUCTS: &[&Declaration<WriteMatch>] = &[
     &units::CSV,
     &points::TABLE,
     &points::CSV,
+    &curves::TABLE,
+    &score_maps::TABLE,
     &REPORT,
 ];
 

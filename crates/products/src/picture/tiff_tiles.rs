@@ -13,7 +13,8 @@ use tiff::{
     tags::Tag,
 };
 
-use super::{PictureError, PictureHead};
+use super::{PictureError, PictureHead, georeference};
+use areograph_pds::control_table::ImageControl;
 
 /// Edge of a tile, pixels.
 const TILE: usize = 256;
@@ -60,9 +61,9 @@ impl TiffTiles {
             .iter()
             .map(|(name, text)| format!("{name}: {text}"))
             .collect();
-        let mut description = Some(notes.join("\n"));
+        let mut first = Some((notes.join("\n"), head.control.as_ref()));
         loop {
-            let half = write_level(&mut encoder, &mut level, description.take())?;
+            let half = write_level(&mut encoder, &mut level, first.take())?;
             if level.width <= TILE && level.height <= TILE {
                 return Ok(());
             }
@@ -79,7 +80,8 @@ pub(super) fn bytes_of(head: &PictureHead) -> u64 {
     let tile = TILE as u64;
     let of_tile = tile * tile * head.bytes_of_pixel() as u64 + 8;
     let (mut width, mut height) = (u64::from(head.width), u64::from(head.height));
-    let mut bytes = TABLES_BYTES;
+    let control = head.control.as_ref();
+    let mut bytes = TABLES_BYTES + control.map_or(0, georeference::bytes_of);
     loop {
         bytes += width.div_ceil(tile) * height.div_ceil(tile) * of_tile;
         if width <= tile && height <= tile {
@@ -89,11 +91,11 @@ pub(super) fn bytes_of(head: &PictureHead) -> u64 {
     }
 }
 
-/// Writes one size of the picture; the next smaller one. Only the largest has a description.
+/// Writes one size of the picture; the next smaller one. Only the largest has a description and control points.
 fn write_level(
     encoder: &mut TiffEncoder<BufWriter<File>, TiffKindStandard>,
     level: &mut Level,
-    description: Option<String>,
+    first: Option<(String, Option<&ImageControl>)>,
 ) -> Result<Level, PictureError> {
     let line_bytes = level.width * level.bytes_of_pixel;
     level.lines.rewind().map_err(tiff::TiffError::IoError)?;
@@ -128,7 +130,7 @@ fn write_level(
         half.write_all(&smaller).map_err(tiff::TiffError::IoError)?;
     }
     let size = |pixels: usize| u32::try_from(pixels).unwrap_or(u32::MAX);
-    directory.write_tag(Tag::NewSubfileType, u32::from(description.is_none()))?;
+    directory.write_tag(Tag::NewSubfileType, u32::from(first.is_none()))?;
     directory.write_tag(Tag::ImageWidth, size(level.width))?;
     directory.write_tag(Tag::ImageLength, size(level.height))?;
     directory.write_tag(
@@ -144,8 +146,11 @@ fn write_level(
     directory.write_tag(Tag::TileLength, size(TILE))?;
     directory.write_tag(Tag::TileOffsets, offsets.as_slice())?;
     directory.write_tag(Tag::TileByteCounts, counts.as_slice())?;
-    if let Some(description) = description {
+    if let Some((description, control)) = first {
         directory.write_tag(Tag::ImageDescription, description.as_str())?;
+        if let Some(control) = control {
+            georeference::write(&mut directory, control)?;
+        }
     }
     directory.finish()?;
     let lines = half
@@ -200,6 +205,7 @@ mod tests {
             height,
             is_deep,
             notes: Vec::new(),
+            control: None,
         };
         // 3 × 2, 2 × 1 and 1 tiles.
         assert_eq!(

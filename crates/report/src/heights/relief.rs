@@ -4,51 +4,61 @@ use super::super::{
     html::{Cell, Column, Markup, Table, html, paragraph},
     plots::label,
 };
-use areograph_stages::adjust::{Adjusted, HeightSummary, ProfileOffset};
+use areograph_stages::adjust::{Adjusted, ProfileOffset, ReliefChoice};
 
-/// Relief is useful if its standard deviation of position is below this fraction of the a priori one.
-const SHARE_OF_USE: f64 = 0.5;
 /// Beyond this standard deviation relief does not determine the position, metres.
 const BEYOND_USE_M: f64 = 1e3;
 
 /// Precision of the position by relief, whether it is useful, and the result if it is used.
 pub(super) fn relief(adjusted: &Adjusted, beforehand: &str) -> Markup {
-    let Some(heights) = &adjusted.heights else {
+    if adjusted.heights.is_none() {
         return Markup::default();
-    };
+    }
     let Some(relief) = &adjusted.relief else {
         return paragraph(
             "Relief does not determine the position of the images: the surface has no slope at the tie points.",
         );
     };
-    let [east_m, north_m] = relief.sigma_m;
-    let axes = format!("±{} m E, ±{} m N", label(east_m, 0), label(north_m, 0));
-    if relief.used {
-        let caption = "Recorded positions of the profiles minus their positions from relief and images, metres";
-        return html! {
-            p { "Relief alone determines the position to " (axes) "; relief is used (adjustment.relief_for_plan)." }
-            (profiles(caption, &relief.profile_shifts))
-        };
-    }
-    if !(east_m.max(north_m) <= BEYOND_USE_M) {
+    let is_imprecise = !(relief.sigma_m[0].max(relief.sigma_m[1]) <= BEYOND_USE_M);
+    if is_imprecise && !relief.used && !matches!(relief.choice, ReliefChoice::Failed(_)) {
         return paragraph("Relief does not determine the position here.");
     }
-    let than = if is_of_use([east_m, north_m], heights) {
-        "much better than"
-    } else {
-        "not much better than"
+    let alone = format!(
+        "Relief alone determines the position to {}",
+        axes(relief.sigma_m)
+    );
+    let [used, not_used] = ["relief is used", "relief is not used"];
+    let is_used = if relief.used { used } else { not_used };
+    let text = match &relief.choice {
+        ReliefChoice::Configured => format!("{alone}; {is_used} (adjustment.relief_for_plan)."),
+        ReliefChoice::Imprecise => {
+            format!("{alone}, less precisely than {beforehand}; {not_used}.")
+        }
+        ReliefChoice::Compared(compared) => format!(
+            "{alone}. The mean position of the tie points is known to {} without relief, and to {} with it; {is_used}.",
+            axes(compared.without_sigma_m),
+            axes(compared.with_sigma_m)
+        ),
+        ReliefChoice::Failed(reason) => {
+            format!("{alone}; {not_used}, because the adjustment with relief failed: {reason}.")
+        }
     };
-    paragraph(&format!(
-        "Relief alone would determine the position to {axes}, {than} {beforehand}; relief is not used \
-         (adjustment.relief_for_plan)."
-    ))
+    let caption =
+        "Recorded positions of the profiles minus their positions from relief and images, metres";
+    html! {
+        (paragraph(&text))
+        @if relief.used {
+            p {
+                "The standard deviations contain a small error that all profiles share. A larger one, such as an error of the \
+                 frame of the altimeter, is not contained in them."
+            }
+        }
+        (profiles(caption, &relief.profile_shifts))
+    }
 }
 
-/// Whether relief is precise enough to be used.
-fn is_of_use(relief_m: [f64; 2], heights: &HeightSummary) -> bool {
-    let [east_m, north_m, _] = heights.mean_sigma_m;
-    let is_of_use = |relief_m: f64, known_m: f64| relief_m < SHARE_OF_USE * known_m;
-    is_of_use(relief_m[0], east_m) && is_of_use(relief_m[1], north_m)
+fn axes([east_m, north_m]: [f64; 2]) -> String {
+    format!("±{} m E, ±{} m N", label(east_m, 0), label(north_m, 0))
 }
 
 /// Shifts of profiles; empty without any.

@@ -4,7 +4,7 @@ use base64::{Engine as _, engine::general_purpose::STANDARD};
 use png::{BitDepth, ColorType, Encoder, EncodingError};
 
 use super::super::{
-    html::{Markup, PreEscaped, counted, html, paragraph},
+    html::{Markup, PreEscaped, counted, folded, html, paragraph},
     map::{keys::ColourBar, relief},
     numbers::signed,
     plots::{drawn, label},
@@ -28,24 +28,30 @@ const MARKS: &str = "<g id=\"similarity-none\"><path d=\"M-6 0H6M0-6V6\" stroke=
      <g id=\"similarity-best\"><circle r=\"6\" fill=\"none\" stroke=\"#000\" stroke-width=\"4\"/>\
      <circle r=\"6\" fill=\"none\" stroke=\"#fff\" stroke-width=\"2\"/></g>\n";
 
-/// The pictures of all units that were searched; empty without any.
+/// The pictures of all units with a surface; empty without any. Those of the examples are shown, and the others folded.
 ///
 /// # Errors
 /// A picture that the library rejects, which is a bug in areograph.
-pub(super) fn pictures(of: &LaserMatch) -> Result<Markup> {
+pub(crate) fn pictures(of: &LaserMatch) -> Result<Markup> {
     let shown = of.units.iter().filter_map(Shown::of);
     let shown: Vec<Shown> = shown.collect();
     let Some(first) = shown.first() else {
         return Ok(Markup::default());
     };
+    let examples: Vec<usize> = of.examples().iter().map(|unit| unit.unit).collect();
+    let (shown_first, others): (Vec<&Shown>, Vec<&Shown>) =
+        (shown.iter()).partition(|shown| examples.contains(&shown.unit.unit));
     let (kept, refused): (Vec<&Shown>, Vec<&Shown>) =
-        shown.iter().partition(|shown| shown.unit.is_kept());
+        others.into_iter().partition(|shown| shown.unit.is_kept());
     Ok(html! {
         (words(of, first.surface))
         (definitions(first.surface))
         (bar()?)
-        (figure("Kept units", &kept)?)
-        (figure("Rejected units", &refused)?)
+        (figure("Units of the elevation curves", &shown_first)?)
+        (folded(
+            &counted(kept.len() + refused.len(), "other unit"),
+            &html! { (figure("Other kept units", &kept)?) (figure("Rejected units", &refused)?) },
+        ))
     })
 }
 

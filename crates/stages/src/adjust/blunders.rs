@@ -4,6 +4,7 @@ use super::{
     heights::height_blunders,
     network::Assembled,
     points::{PointKind, RejectedPoint, RejectionReason},
+    tie_correlation::common_noise,
     tie_scatter::{SCATTER_MAX_PX, tie_scatter_px},
 };
 use areograph_base::watch::Watch;
@@ -41,7 +42,11 @@ pub(super) fn solve_without_blunders<M: ExteriorOrientation>(
     if assembled.network.heights.is_none() {
         return Ok(adjustment);
     }
-    by_heights(assembled, bundle_options, config, adjustment, watch)?;
+    let adjustment = by_heights(assembled, bundle_options, config, adjustment, watch)?;
+    let common_noise = common_noise(assembled, &adjustment);
+    if let Some(control) = &mut assembled.network.heights {
+        control.common_noise = common_noise;
+    }
     assembled.observe_heights();
     let adjustment = solved(assembled, bundle_options, watch)?;
     // Once the heights bend as the ground does, other blunders stand out.

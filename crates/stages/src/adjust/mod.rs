@@ -16,7 +16,7 @@
 //! - `geom/bundle/spots`: the mounting places the laser in simultaneous images (decision 0021). Boresight and profile
 //!   shifts are unknowns, also those of heights on relief.
 //! - `geom/bundle/relief`: heights depend on the horizontal position and on the position of each profile. Its accuracy
-//!   is reported whether or not it is used.
+//!   is reported whether or not it is used; `by_relief` decides (decision 0037).
 //! - the attitude clock, one unknown of all images. It is a decision, not an estimate; `split` reports both readings
 //!   (decision 0019).
 //!
@@ -28,6 +28,7 @@ mod a_priori;
 mod adjusted;
 mod attitude_clock;
 mod blunders;
+mod by_relief;
 mod common_bus;
 mod components;
 mod error;
@@ -44,6 +45,7 @@ mod run;
 mod split;
 mod stage;
 mod summary;
+mod tie_correlation;
 mod tie_scatter;
 mod words;
 
@@ -61,7 +63,7 @@ pub use line_times::LineDelay;
 pub use point_errors::{SharedError, recorded_m2};
 pub use points::{PointKind, RejectedPoint, RejectionReason};
 pub use prepare::{Candidate, prepare_adjustment};
-pub use relief::{ProfileOffset, ReliefSummary};
+pub use relief::{ProfileOffset, ReliefChoice, ReliefComparison, ReliefSummary};
 pub use run::adjust;
 pub use split::OtherReading;
 pub use stage::Adjust;

@@ -96,6 +96,7 @@ pub(super) fn assemble<'a, M: ExteriorOrientation>(
         assembled.network.heights = Some(HeightControl {
             surface: surface.clone(),
             jitter: Some(JITTER),
+            common_noise: None,
             compared: ties.collect(),
             observed: Vec::new(),
         });

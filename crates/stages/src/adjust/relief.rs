@@ -18,6 +18,37 @@ pub struct ReliefSummary {
     pub sigma_m: [f64; 2],
     /// If relief is used: offset of the recorded from the true position of each profile of the surface.
     pub profile_shifts: Vec<ProfileOffset>,
+    /// A priori standard deviation of these offsets in east and north, metres: the configured value, or a larger one if the
+    /// offsets scatter more.
+    #[schemars(range(min = 0.0))]
+    pub profile_plan_sigma_m: f64,
+    /// Reason why relief is used, or is not.
+    pub choice: ReliefChoice,
+}
+
+/// Reason why relief is used for the horizontal position, or is not.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ReliefChoice {
+    /// The configuration decides (`adjustment.relief_for_plan`).
+    Configured,
+    /// Relief alone is less precise than the position without relief on both axes.
+    Imprecise,
+    /// The mean position of the tie points was computed without and with relief.
+    Compared(ReliefComparison),
+    /// The adjustment with relief failed for this reason; the adjustment without relief replaces it.
+    Failed(String),
+}
+
+/// Mean position of the tie points without and with relief.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ReliefComparison {
+    /// Standard deviations without relief, east and north, metres.
+    #[schemars(transform = none_negative)]
+    pub without_sigma_m: [f64; 2],
+    /// Standard deviations with relief, east and north, metres.
+    #[schemars(transform = none_negative)]
+    pub with_sigma_m: [f64; 2],
 }
 
 /// Offset of the recorded from the true position of a profile.
@@ -51,5 +82,7 @@ pub(super) fn relief<M>(
         used: control.surface.uses_relief(),
         sigma_m: relief.sigma_m,
         profile_shifts: shifts.collect(),
+        profile_plan_sigma_m: control.surface.profile_plan_sigma_m(),
+        choice: ReliefChoice::Configured,
     })
 }

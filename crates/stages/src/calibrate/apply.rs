@@ -45,8 +45,8 @@ pub fn apply_calibration(calibrated: &[PathBuf], isd: &Path) -> Result<AppliedCa
     Ok(AppliedCalibration {
         moved_px: found.moved_rad / pixel_rad(&given),
         isd: SupportSource::File(isd).with_camera_of(SupportSource::File(&found.file))?,
-        calibration: found.calibration,
-        camera: found.name,
+        calibration: found.origin.calibration,
+        camera: found.origin.camera,
     })
 }
 

@@ -134,6 +134,11 @@ impl Orbit {
         Vector3::from_fn(|axis, _| sigma_m * turn.row(axis).norm())
     }
 
+    /// Middle of the images, ET seconds.
+    pub(super) const fn middle_s(&self) -> f64 {
+        self.middle_s
+    }
+
     /// Shift of the orbit at an instant, J2000, metres.
     pub(super) fn shift_m(
         &self,

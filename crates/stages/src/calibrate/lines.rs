@@ -82,7 +82,7 @@ stage_inputs! {
 
 impl Stage for AlignLines<'_> {
     const NAME: &'static str = "align_lines";
-    const METHOD: u32 = 4;
+    const METHOD: u32 = 5;
     const CALLS: &'static [Called] = &[called::<Calibrate<'_>>()];
     type Output = Calibration;
     stage_inputs!(fingerprint);
@@ -125,7 +125,7 @@ stage_inputs! {
 
 impl Stage for CalibrateLines<'_> {
     const NAME: &'static str = "calibrate";
-    const METHOD: u32 = 3;
+    const METHOD: u32 = 4;
     const CALLS: &'static [Called] = &[called::<Calibrate<'_>>()];
     type Output = Calibration;
     stage_inputs!(fingerprint);

@@ -13,6 +13,7 @@ mod given;
 mod ground;
 mod judge;
 mod lines;
+mod looks;
 mod measure;
 mod outcome;
 mod read;
@@ -39,8 +40,8 @@ pub use error::CalibrateError;
 pub use lines::{AlignLines, CalibrateLines, LineKeys, OtherOrbits};
 pub use result::{
     Calibration, CalibrationRound, CalibrationStep, CameraResult, ControlFigures, ControlOffset,
-    Figures, HeldBack, ImageResult, PixelsAndMetres, PointKind, PointResult, Rounds, Scatter,
-    Scattered, TieFigures, TieGround, ValidationResult, Value,
+    Figures, HeldBack, ImageResult, LineLooks, Looks, PixelsAndMetres, PointKind, PointResult,
+    Rounds, Scatter, Scattered, TieFigures, TieGround, ValidationResult, Value,
 };
 
 stage_inputs! {
@@ -84,7 +85,7 @@ impl Input for CalibrationFiles<'_> {
 
 impl Stage for Calibrate<'_> {
     const NAME: &'static str = "calibrate";
-    const METHOD: u32 = 16;
+    const METHOD: u32 = 17;
     type Output = Calibration;
     stage_inputs!(fingerprint);
 

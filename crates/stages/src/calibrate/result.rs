@@ -15,6 +15,8 @@ pub struct Calibration {
     pub cameras: Vec<CameraResult>,
     /// Drift of the orbit, body-fixed, metres per image line; the calibrated support data contain it.
     pub drift_m_per_line: [Value; 3],
+    /// Look directions of all lines, for the comparison with calibrations of other orbits.
+    pub looks: Looks,
     /// Sensitivity of tie points to the offset angles.
     pub tie_sight: TieSight,
     /// The test of tie points against the ground between laser points; `None` where these are too few.
@@ -91,6 +93,31 @@ pub struct CameraResult {
     /// Their largest residual against the calibrated look directions, pixels: support data hold a straight line of
     /// equal samples with a distortion of third degree.
     pub isd_left_px: f64,
+}
+
+/// Changes of look directions from the laboratory, as six parameters of each line: roll, pitch, yaw, scale, bend across and
+/// bend along the flight. Unlike offset angles and coefficients, these do not depend on each other.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Looks {
+    /// Middle of the images, seconds of ephemeris time (TDB after J2000).
+    pub middle_et_s: f64,
+    /// The lines, in the order of `cameras`.
+    pub lines: Vec<LineLooks>,
+    /// Covariance of all parameters from measurements, line by line, tangents squared.
+    pub covariance: Vec<Vec<f64>>,
+    /// Changes of all parameters by one a priori standard deviation of each error of the orbit, tangents: shifts across,
+    /// along and down, and rotations about these axes.
+    pub by_orbit: Vec<Vec<f64>>,
+}
+
+/// Look directions of a line.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct LineLooks {
+    /// Name of the line in support data.
+    pub sensor: String,
+    /// Changes from the laboratory, tangents: roll and pitch in the middle of the image, yaw and scale as half the
+    /// difference of its edges, bends as the mean of its edges minus its middle.
+    pub changes: [f64; 6],
 }
 
 /// Statistics of the points after a step.

@@ -170,6 +170,7 @@ fn calibrate_by(
             &orbit,
             config.a_priori.orbit_bias_m,
         ),
+        looks: outcome.looks(&config.a_priori)?,
         tie_sight: sight,
         tie_ground: work.tie_ground,
         points: outcome.points(),

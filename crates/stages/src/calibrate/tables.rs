@@ -13,7 +13,7 @@ use areograph_base::{
     units::RADIANS_PER_DEGREE,
 };
 use areograph_geom::{
-    calibration::KnownPlace,
+    calibration::{KnownPlace, SharedError},
     ellipsoid::{local_axes, spherical_to_xyz_m},
 };
 use areograph_pds::{
@@ -190,6 +190,7 @@ pub(super) fn control(
     complaints: &mut Complaints,
 ) -> Result<Vec<MeasuredPoint>> {
     let mut points = Points::default();
+    let mut profiles: BTreeMap<String, usize> = BTreeMap::new();
     for path in files {
         for row in complaints.take(path, read_control(path)?) {
             let measured = cameras.measured(&row.image, sigma.image_px).in_file(path)?;
@@ -204,7 +205,12 @@ pub(super) fn control(
             if !new {
                 complaints.tell(format!("{}: {}", file_name(path), twice(&row.image)));
             }
-            let known = known(&row, sigma);
+            let mut known = known(&row, sigma);
+            let next = profiles.len();
+            known.shared = row.profile.map(|profile| SharedError {
+                group: *profiles.entry(profile).or_insert(next),
+                sigma_m: row.shared_m.map(Option::unwrap_or_default),
+            });
             let point = &mut points.points[at];
             if point.known.is_some_and(|of| of.place_m != known.place_m) {
                 return Err(CalibrateError::TwoPlaces {
@@ -276,5 +282,6 @@ pub(super) fn known_place(
     KnownPlace {
         place_m,
         whitening: Matrix3::from_diagonal(&over) * local_axes(&place_m),
+        shared: None,
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{AdjustmentEvidence, Evidence, JudgedImage};
 use crate::{
-    adjust::{HEIGHTS_MIN, HeightSummary, ObservationType, PointKind, TypeSummary},
+    adjust::{HEIGHTS_MIN, HeightSummary, ObservationType, PointKind, ReliefChoice, TypeSummary},
     compare_pairs::PairComparison,
 };
 use areograph_base::{footprints::AdjustmentModel, minus::signed, terms::Terms};
@@ -364,6 +364,13 @@ impl AdjustmentEvidence<'_> {
                  kernels whatever this error"
                     .to_owned(),
             );
+        }
+        if let Some(ReliefChoice::Failed(reason)) =
+            self.adjusted.relief.as_ref().map(|of| &of.choice)
+        {
+            remarks.push(format!(
+                "the horizontal position does not use relief, because the adjustment with relief failed: {reason}"
+            ));
         }
         remarks.extend(self.laser_missing());
         remarks.extend(self.spots_spoiled());

@@ -57,6 +57,7 @@ pub(super) fn untested(evidence: &Evidence<'_>) -> Vec<String> {
         };
         Group::new(reason).with("errors of single tie points across the track")
     }));
+    groups.push(profiles(evidence));
     groups.push(shots(evidence, !tested.is_empty()));
     groups.extend([orbit(evidence), radii(evidence), uncovered(evidence)]);
     groups.iter().filter_map(Group::phrase).collect()
@@ -165,6 +166,18 @@ fn images(evidence: &Evidence<'_>) -> [Group; 3] {
         }
     }
     [one_label, by_ties, without_ties]
+}
+
+/// Positions of profiles, where relief under them determines the position of the images.
+fn profiles(evidence: &Evidence<'_>) -> Group {
+    let group = Group::new("crossovers show differences between profiles only");
+    let adjusted = evidence.adjustment.map(|of| of.adjusted);
+    let relief = adjusted.and_then(|adjusted| adjusted.relief.as_ref());
+    if relief.is_some_and(|relief| relief.used) {
+        group.with("a horizontal shift that many profiles share")
+    } else {
+        group
+    }
 }
 
 /// Errors that both sides of a comparison with shots contain.

@@ -1,6 +1,9 @@
 //! The images of the pictures of a net.
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
 
 use areograph_base::error::{Cause, Locate as _, Result};
 use areograph_config::{NetConfig, YAxis};
@@ -51,6 +54,12 @@ pub(super) enum PicturesError {
     #[error("picture {picture}: the table names image {file}, which does not exist")]
     #[cause("correct the column image; paths are relative to the folder of the table")]
     Missing { picture: String, file: String },
+    #[error("picture {picture}: the table names image {file}, which is a folder; expected a file")]
+    #[cause("correct the column image; paths are relative to the folder of the table")]
+    Folder { picture: String, file: String },
+    #[error("pictures {} and {} name the same image {file}; expected an image of its own for each picture", pictures[0], pictures[1])]
+    #[cause("correct the column image of one of them")]
+    Shared { pictures: [String; 2], file: String },
     #[error("picture {picture} has two images; expected one row for each picture")]
     #[cause("remove one of the rows from pictures.files")]
     Twice { picture: String },
@@ -92,9 +101,11 @@ pub(super) enum PicturesError {
 /// The images that the tables of pictures name.
 ///
 /// # Errors
-/// A table that cannot be read; a file that does not exist; two images of a picture; a film correction.
+/// A table that cannot be read; a file that does not exist; two images of a picture, or two pictures of an
+/// image; too many images; a film correction.
 pub fn picture_images(config: &NetConfig) -> Result<Vec<PictureImage>> {
     let mut images: Vec<PictureImage> = Vec::new();
+    let mut files: BTreeMap<PathBuf, String> = BTreeMap::new();
     for table in &config.pictures.files {
         // The stage that solves the net reports malformed rows.
         for row in read_pictures(table)?.rows {
@@ -104,8 +115,20 @@ pub fn picture_images(config: &NetConfig) -> Result<Vec<PictureImage>> {
                 let picture = image.picture;
                 return Err(PicturesError::Twice { picture }).in_file(table);
             }
+            // Also by another name of the file.
+            let file = image.path.canonicalize();
+            let file = file.unwrap_or_else(|_| image.path.clone());
+            if let Some(other) = files.insert(file, image.picture.clone()) {
+                let file = file_name(&image.path);
+                let pictures = [other, image.picture];
+                return Err(PicturesError::Shared { pictures, file }).in_file(table);
+            }
             images.push(image);
         }
+    }
+    if images.len() > ORTHOIMAGES_MAX {
+        let count = images.len();
+        return Err(PicturesError::TooMany { count }).in_file(&config.file);
     }
     Ok(images)
 }
@@ -128,7 +151,11 @@ fn one(
     let path = folder.join(file);
     if !path.is_file() {
         let file = file_name(&path);
-        return Err(PicturesError::Missing { picture, file });
+        return Err(if path.is_dir() {
+            PicturesError::Folder { picture, file }
+        } else {
+            PicturesError::Missing { picture, file }
+        });
     }
     Ok(PictureImage {
         picture,

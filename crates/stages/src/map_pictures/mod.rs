@@ -109,10 +109,6 @@ impl Stage for MapPictures<'_> {
         if images.is_empty() {
             return Ok(None);
         }
-        if images.len() > ORTHOIMAGES_MAX {
-            let count = images.len();
-            return Err(PicturesError::TooMany { count }.into());
-        }
         let cameras = all_instruments();
         let mut views = Vec::new();
         for image in images {
@@ -140,10 +136,11 @@ impl Stage for MapPictures<'_> {
         let mut made: Vec<Orthoimage> = Vec::new();
         for (index, view) in views.iter().enumerate() {
             let rectified = view.rectified(index, cell_m, watch)?;
-            made.push(rectified.ok_or_else(|| PicturesError::Empty {
+            let empty = || PicturesError::Empty {
                 picture: images[index].picture.clone(),
                 cell_m,
-            })?);
+            };
+            made.push(rectified.ok_or_else(empty).in_file(&images[index].path)?);
         }
         let mut pairs = Vec::new();
         for (at, first) in made.iter().enumerate() {

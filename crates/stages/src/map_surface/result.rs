@@ -211,6 +211,15 @@ pub struct SurfaceLook {
 }
 
 impl Surface {
+    /// The model; `None` where too few cells matched, so that it is withheld.
+    #[must_use]
+    pub const fn model(&self) -> Option<&SurfaceModel> {
+        if self.account.is_refused {
+            return None;
+        }
+        Some(&self.model)
+    }
+
     /// That of a pair without common ground, or without convergence.
     pub(crate) fn withheld(images: [usize; 2], cell_m: f64) -> Self {
         let model = SurfaceModel::nothing();

@@ -26,3 +26,22 @@ pub(super) fn enter(cameras: &[LineCamera], points: &mut [MatchedPoint]) -> Resu
     }
     Ok(())
 }
+
+/// Points that an image does not show, in words.
+pub(super) fn unseen(images: &[String], points: &[MatchedPoint]) -> Vec<String> {
+    let pairs = points.iter().flat_map(|point| {
+        images
+            .iter()
+            .zip(&point.in_images)
+            .map(move |of| (point, of))
+    });
+    let unseen = pairs.filter(|(_, (_, seen))| seen.is_none());
+    unseen
+        .map(|(point, (image, _))| {
+            format!(
+                "point {} of unit {} is not in image {image}",
+                point.name, point.unit
+            )
+        })
+        .collect()
+}

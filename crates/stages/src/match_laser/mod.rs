@@ -11,7 +11,8 @@
 //! | `scatter` | scatter of units about a plane, which widens standard deviations |
 //! | `judge` | the verdict |
 //! | `images` | lines and samples in the images |
-//! | `surface` | similarities for the page: a byte per shift, at most 141 by 141; rounds of a calibration compute none |
+//! | `surface` | similarities of a unit: a byte per shift, at most 141 by 141 |
+//! | `curves`, `pass` | heights of laser, model and shifted model along every pass |
 //!
 //! The bias found by correlation selects the measure. Disagreement reveals shifts by chance: units far from the median
 //! of all are rejected; where fewer than half agree, the match is rejected.
@@ -21,10 +22,12 @@
 //! open and departures from it are documented at the constants.
 
 mod clusters;
+mod curves;
 mod error;
 mod images;
 mod judge;
 mod model;
+mod pass;
 mod result;
 mod scatter;
 mod search;
@@ -43,7 +46,7 @@ use serde::{Deserialize, Serialize};
 
 use self::{
     clusters::clusters,
-    images::enter,
+    images::{enter, unseen},
     judge::{Evidence, bias_limit_m, judge, pooled},
     result::{HeldBackGround, ModelRequest},
     scatter::widen,
@@ -53,6 +56,7 @@ use self::{
 pub use self::{
     error::MatchError,
     model::{LaserKeys, MatchModel, ModelMatch},
+    pass::{Pass, PassShot},
     result::{
         HeldOut, LaserMatch, MatchImage, MatchOptions, MatchRequest, MatchSigma, MatchedPoint,
         UnitMatch, UnitResult, Widened,
@@ -86,7 +90,7 @@ stage_inputs! {
 
 impl Stage for MatchLaser<'_> {
     const NAME: &'static str = "match_laser";
-    const METHOD: u32 = 10;
+    const METHOD: u32 = 11;
     const CALLS: &'static [Called] = &[called::<ConvertDatum<'_>>()];
     type Output = LaserMatch;
     stage_inputs!(fingerprint);
@@ -126,7 +130,6 @@ pub fn match_laser(request: &MatchRequest, stop: &AtomicBool) -> Result<LaserMat
         options: &request.options,
         held_back: None,
         radius_is_stated: request.radius_m.is_some(),
-        has_surfaces: true,
     };
     Ok(matched(&asked, None, stop)?.0)
 }
@@ -181,7 +184,6 @@ fn match_model(
         held_back: Some(request.held_back),
         // Its cameras define the reference of its heights.
         radius_is_stated: true,
-        has_surfaces: false,
     };
     matched(&asked, units, stop)
 }
@@ -237,8 +239,6 @@ struct Asked<'a> {
     held_back: Option<HeldBackGround>,
     /// Whether the reference radius of the model's heights is stated.
     radius_is_stated: bool,
-    /// Whether pages show the similarities of units.
-    has_surfaces: bool,
 }
 
 fn matched(
@@ -265,10 +265,9 @@ fn matched(
     let mut search = searched(grid, &units, options);
     let matching = refuse_lonely(&mut search.units, options.search_cells);
     let widened = widen(&mut search.units, grid.cell_m());
-    if asked.has_surfaces {
-        Stopped::check(stop)?;
-        enter_surfaces(grid, &units, &mut search, options.search_cells);
-    }
+    Stopped::check(stop)?;
+    enter_surfaces(grid, &units, &mut search, options.search_cells);
+    let passes = curves::passes(grid, &shots.shots, &units, &search.units);
     let points = units.iter().zip(&search.units);
     let points = points.filter(|(_, result)| result.is_kept());
     let mut points: Vec<MatchedPoint> = points
@@ -316,6 +315,7 @@ fn matched(
         held_out,
         widened,
         units: search.units,
+        passes,
         points,
         images,
         verdict,
@@ -400,13 +400,15 @@ fn searched(grid: &HeightGrid, units: &[Unit<'_>], options: &MatchOptions) -> Se
     }
 }
 
-/// Enters similarities at all shifts by the measure that ran, of every searched unit. They are computed separately,
-/// since most searches, in a calibration's rounds or by another measure, are not shown on a page.
+/// Enters similarities at all shifts by the measure that ran, of every searched unit, or of those `shown`. They are
+/// computed separately, since most searches, in a calibration's rounds or by another measure, are not shown on a page.
 fn enter_surfaces(grid: &HeightGrid, units: &[Unit<'_>], search: &mut Searched, reach: u32) {
     let measure = search.measure;
     let each = units.par_iter().zip(&mut search.units);
     each.filter(|(_, result)| result.found.is_some())
-        .for_each(|(unit, result)| result.similarity = Some(unit.surface(grid, measure, reach)));
+        .for_each(|(unit, result)| {
+            result.similarity = Some(unit.surface(grid, measure, reach));
+        });
 }
 
 /// Median of model minus laser over the kept units that are not withheld, metres.
@@ -414,23 +416,4 @@ fn median_bias_m(units: &[UnitResult]) -> Option<f64> {
     let kept = units.iter().filter(|unit| unit.is_kept() && !unit.judges);
     let biases_m: Vec<f64> = kept.filter_map(|unit| Some(unit.found?.bias_m)).collect();
     (!biases_m.is_empty()).then(|| Summary::of(&biases_m).median)
-}
-
-/// Points that an image does not show, in words.
-fn unseen(images: &[String], points: &[MatchedPoint]) -> Vec<String> {
-    let pairs = points.iter().flat_map(|point| {
-        images
-            .iter()
-            .zip(&point.in_images)
-            .map(move |of| (point, of))
-    });
-    let unseen = pairs.filter(|(_, (_, seen))| seen.is_none());
-    unseen
-        .map(|(point, (image, _))| {
-            format!(
-                "point {} of unit {} is not in image {image}",
-                point.name, point.unit
-            )
-        })
-        .collect()
 }

@@ -89,7 +89,7 @@ struct FewUnits {
 
 impl Stage for MatchModel<'_> {
     const NAME: &'static str = "match_laser";
-    const METHOD: u32 = 2;
+    const METHOD: u32 = 4;
     const CALLS: &'static [Called] = &[called::<MatchLaser<'_>>(), called::<ConvertDatum<'_>>()];
     type Output = ModelMatch;
     stage_inputs!(fingerprint);

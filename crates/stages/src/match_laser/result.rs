@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use super::{similarity::Similarity, surface::SimilaritySurface};
+use super::{pass::Pass, similarity::Similarity, surface::SimilaritySurface};
 use crate::{judge::Verdict, line_camera::LineCamera};
 use areograph_base::{
     altimetry::{GroundRadius, ShotFilter},
@@ -122,6 +122,8 @@ pub struct LaserMatch {
     pub widened: Option<Widened>,
     /// Every unit, kept or not.
     pub units: Vec<UnitResult>,
+    /// Heights along every pass.
+    pub passes: Vec<Pass>,
     /// A control point of every kept unit.
     pub points: Vec<MatchedPoint>,
     /// Names of the images.
@@ -132,6 +134,24 @@ pub struct LaserMatch {
     pub complaints: Vec<String>,
     /// Their number.
     pub complaint_count: u64,
+}
+
+impl LaserMatch {
+    /// Kept units with the lowest, the median and the highest similarity, in this order; fewer where fewer are kept.
+    #[must_use]
+    pub fn examples(&self) -> Vec<&UnitResult> {
+        let shown = examples(&self.units);
+        shown.into_iter().map(|at| &self.units[at]).collect()
+    }
+
+    /// The pass with the shifted model at the most shots, and at least at two.
+    #[must_use]
+    pub fn longest_pass(&self) -> Option<&Pass> {
+        let passes = self.passes.iter().rev();
+        passes
+            .max_by_key(|pass| pass.shifted())
+            .filter(|pass| pass.shifted() >= 2)
+    }
 }
 
 /// Model minus laser at held-out shots: root mean squares about the bias of the used shots, metres.
@@ -169,7 +189,7 @@ pub struct UnitResult {
     /// Concordance of model and laser heights at held-out shots, without and with the shift (Li et al. 2023, eq. 18 and
     /// Table 4); `None` where the model has too few heights.
     pub concordance: [Option<f64>; 2],
-    /// Similarity over the shifts of that search; absent in matches of models that are made round by round.
+    /// Similarity over the shifts of that search.
     pub similarity: Option<SimilaritySurface>,
     /// Reason why it is rejected; empty if it is kept.
     pub refused_because: String,
@@ -258,5 +278,65 @@ impl MatchedPoint {
     pub fn sigma_horizontal_m(&self) -> f64 {
         let [east_m, north_m, _] = self.sigma_m;
         std::f64::consts::FRAC_1_SQRT_2 * east_m.hypot(north_m)
+    }
+}
+
+/// Kept units with the lowest, the median and the highest similarity, by index; fewer where fewer are kept.
+fn examples(units: &[UnitResult]) -> Vec<usize> {
+    let mut scores: Vec<(usize, f64)> = units
+        .iter()
+        .enumerate()
+        .filter(|(_, unit)| unit.is_kept())
+        .filter_map(|(at, unit)| Some((at, unit.found?.score)))
+        .collect();
+    scores.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let Some(last) = scores.len().checked_sub(1) else {
+        return Vec::new();
+    };
+    let mut shown = vec![0, last / 2, last];
+    shown.dedup();
+    shown.into_iter().map(|at| scores[at].0).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn unit(score: Option<f64>, refused_because: &str) -> UnitResult {
+        UnitResult {
+            unit: 1,
+            place_rad: [0.0; 2],
+            judges: false,
+            shots: 60,
+            strips: 2,
+            radius_m: 5_000.0,
+            relief_m: 80.0,
+            found: score.map(|score| UnitMatch {
+                shift_cells: [0.0; 2],
+                shift_m: [0.0; 2],
+                shift_rad: [0.0; 2],
+                score,
+                contrast: 2.0,
+                bias_m: 0.0,
+                sigma: None,
+            }),
+            held_out: None,
+            concordance: [None; 2],
+            similarity: None,
+            refused_because: refused_because.to_owned(),
+        }
+    }
+
+    #[test]
+    fn examples_are_the_lowest_the_median_and_the_highest_of_kept_units() {
+        let kept = |scores: &[f64]| -> Vec<UnitResult> {
+            let refused = [unit(Some(0.1), "far"), unit(None, "flat")];
+            let kept = scores.iter().map(|score| unit(Some(*score), ""));
+            refused.into_iter().chain(kept).collect()
+        };
+        assert_eq!(examples(&kept(&[])), [0; 0]);
+        assert_eq!(examples(&kept(&[0.95])), [2]);
+        assert_eq!(examples(&kept(&[0.95, 0.92])), [3, 2]);
+        assert_eq!(examples(&kept(&[0.95, 0.99, 0.91, 0.97, 0.93])), [4, 2, 3]);
     }
 }

@@ -1,4 +1,4 @@
-//! Similarity of the heights of a unit at all shifts, for display.
+//! Similarity of the heights of a unit at all shifts.
 
 use serde::{Deserialize, Serialize};
 

@@ -79,6 +79,12 @@ impl<'a> Unit<'a> {
         self.result.judges
     }
 
+    /// Its shots, and whether each is held out.
+    pub(super) fn members(&self) -> impl Iterator<Item = (&'a Shot, bool)> {
+        let used = self.used.iter().map(|shot| (*shot, false));
+        used.chain(self.held_out.iter().map(|shot| (*shot, true)))
+    }
+
     /// Names of its shots.
     pub(super) fn names(&self) -> Vec<String> {
         let shots = self.used.iter().chain(&self.held_out);

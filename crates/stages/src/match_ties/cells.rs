@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use nalgebra::Vector2;
+use nalgebra::{Vector2, Vector3};
 use rayon::prelude::*;
 
 use super::search::{HALF_LEAST_SQUARES, scale};
@@ -13,6 +13,10 @@ use areograph_pds::pixel_file::Pyramid;
 
 /// Cells that the common ground is cut into.
 const CELLS: f64 = 320.0;
+/// Edge of a cell around a laser shot, metres, and its minimum in pixels: the cell contains a place with texture, and its height
+/// differs little from the height of the shot.
+const SHOT_EDGE_M: f64 = 60.0;
+const SHOT_EDGE_PX: f64 = 8.0;
 /// Numbers of lines and samples of an image at which overlap with the other is tested.
 const ASKED: [u32; 2] = [257, 33];
 /// Quantile of the cells' noise that counts as the noise of the image: texture only adds to it.
@@ -122,6 +126,35 @@ impl Common {
             .collect()
     }
 
+    /// Cells around laser shots `shots_m` in the common ground: at most as many as [`Self::cells`], evenly selected in the order
+    /// of the shots. Between profiles the ground is known less precisely, so that heights there determine the position of
+    /// the images less precisely.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "coordinates within an image"
+    )]
+    pub(super) fn cells_at_shots(&self, here: &View<'_>, shots_m: &[Vector3<f64>]) -> Vec<Cell> {
+        let half_px =
+            self.spacing_m[0].map(|spacing_m| 0.5 * (SHOT_EDGE_M / spacing_m).max(SHOT_EDGE_PX));
+        let around = shots_m.par_iter().filter_map(|shot_m| {
+            let place = here.place(shot_m)?;
+            let [from, to] = [place - half_px, place + half_px];
+            let is_inside =
+                (0..2).all(|axis| from[axis] >= self.low[axis] && to[axis] < self.high[axis]);
+            let span = |axis: usize| from[axis] as usize..to[axis] as usize;
+            is_inside.then(|| Cell {
+                lines: span(0),
+                samples: span(1),
+            })
+        });
+        let around: Vec<Cell> = around.collect();
+        let count = around.len().min(CELLS as usize);
+        (0..count)
+            .map(|index| around[index * around.len() / count].clone())
+            .collect()
+    }
+
     /// The part that holds a place, of `parts` along lines and samples.
     #[allow(
         clippy::cast_possible_truncation,
@@ -160,12 +193,11 @@ impl Cell {
     }
 }
 
-/// In each cell the place with the most texture, or why there is none.
+/// Noise of an image with these `cells`, in its digital numbers.
 ///
 /// # Errors
 /// The system's refusal to read.
-pub(super) fn places(cells: &[Cell], pixels: &Pyramid, level: usize) -> Result<Vec<Place>> {
-    let half = usize::try_from(HALF_LEAST_SQUARES).unwrap_or_default();
+pub(super) fn quiet_dn(cells: &[Cell], pixels: &Pyramid, level: usize) -> Result<f64> {
     let noise = cells.par_iter().map(|cell| -> Result<Option<f64>> {
         let patch = cell.pixels(pixels, level)?;
         Ok(patch.and_then(|patch| noise_dn(&patch)))
@@ -179,12 +211,25 @@ pub(super) fn places(cells: &[Cell], pixels: &Pyramid, level: usize) -> Result<V
         reason = "a share of a number of elements"
     )]
     let quiet = noise.get((QUIET_SHARE * noise.len() as f64) as usize);
-    let quiet = quiet.copied().unwrap_or_default();
+    Ok(quiet.copied().unwrap_or_default())
+}
+
+/// In each cell the place with the most texture above the noise `quiet_dn`, or why there is none.
+///
+/// # Errors
+/// The system's refusal to read.
+pub(super) fn places(
+    cells: &[Cell],
+    pixels: &Pyramid,
+    level: usize,
+    quiet_dn: f64,
+) -> Result<Vec<Place>> {
+    let half = usize::try_from(HALF_LEAST_SQUARES).unwrap_or_default();
     let places = cells.par_iter().map(|cell| -> Result<Place> {
         let Some(patch) = cell.pixels(pixels, level)? else {
             return Ok(Err(Unmatched::Missing));
         };
-        let found = texture(&patch, half, quiet).filter(|found| found.sigma_px <= FLAT_PX);
+        let found = texture(&patch, half, quiet_dn).filter(|found| found.sigma_px <= FLAT_PX);
         Ok(found.ok_or(Unmatched::Flat).map(|found| {
             let [line, sample] = found.at.map(|pixel| (pixel as f64 + 0.5) * scale(level));
             Vector2::new(line, sample)

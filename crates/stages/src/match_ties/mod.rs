@@ -1,6 +1,6 @@
 //! Tie points that areograph measures itself.
 //!
-//! The common ground of every pair of images with pixels is divided into cells. In each, the place with the most
+//! The common ground of every pair of images with pixels is divided into cells, and has further cells at the laser shots. In each, the place with the most
 //! texture is searched in the other image: at the position and with the distortion that orientations and MOLA heights
 //! predict, within their stated uncertainty, which is long along the epipolar curve where the height is uncertain.
 //! Correlation proceeds from coarse to fine, least squares refines it, and the search is repeated from the other image.
@@ -99,7 +99,7 @@ enum MatchError {
 
 impl Stage for MatchTies<'_> {
     const NAME: &'static str = "match_ties";
-    const METHOD: u32 = 3;
+    const METHOD: u32 = 4;
     type Output = Ties;
     stage_inputs!(fingerprint);
 

@@ -1,4 +1,4 @@
-//! A pair of images: every cell of their common ground is tried in both directions.
+//! A pair of images: every cell of their common ground, and every cell around a laser shot, is tried in both directions.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -6,7 +6,7 @@ use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 
 use super::{
-    cells::{Common, places},
+    cells::{Common, places, quiet_dn},
     margin::Margin,
     search::{Found, Search},
 };
@@ -64,10 +64,13 @@ pub(super) fn match_pair(
         views,
         levels: common.levels(),
     };
-    let cells = common.cells();
+    let mut cells = common.cells();
+    let (pixels, level) = (views[0].pixels, search.levels[0]);
+    let quiet_dn = quiet_dn(&cells, pixels, level)?;
+    cells.extend(common.cells_at_shots(views[0], heights.shots_m()));
     watch.announce(cells.len());
     let reach_m = margin.reach_m(indices, common.ranges_m);
-    let places = places(&cells, views[0].pixels, search.levels[0])?;
+    let places = places(&cells, pixels, level, quiet_dn)?;
     let tried = cells
         .par_iter()
         .zip(places)

@@ -27,9 +27,8 @@ use serde::{Deserialize, Serialize};
 use super::{
     compare_orthoimages::{EDGE, OrthoimageOffsets, PlaceOffset},
     look::OrthoimageLook,
-    map_surface::Surface,
     raster::{Raster, first_cell},
-    rectify_images::{CELLS_MAX, Orthoimage},
+    rectify_images::{CELLS_MAX, GroundModel, Orthoimage},
     site_image::SiteImages,
 };
 use areograph_base::{
@@ -65,8 +64,8 @@ stage_inputs! {
         pub round: Round,
         /// The images.
         pub images: SiteImages<'a>,
-        /// The terrain model.
-        pub surface: &'a Output<Surface>,
+        /// The heights of the ground.
+        pub surface: GroundModel<'a>,
         /// The orthoimages.
         pub orthoimages: &'a Output<Vec<Orthoimage>>,
         /// Their offsets.
@@ -201,8 +200,9 @@ impl Stage for MosaicImages<'_> {
         if orthoimages.is_empty() {
             return Ok(None);
         }
-        let surface = self.surface.value()?;
-        let look = &surface.account.look.heights;
+        let Some(look) = self.surface.look()? else {
+            return Ok(None);
+        };
         let known = look.heights_m.iter().filter(|of| !of.is_nan());
         let height_m = median(&mut known.map(|of| f64::from(*of)).collect::<Vec<_>>());
         let oriented = self.images.oriented()?;

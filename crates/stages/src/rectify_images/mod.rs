@@ -12,16 +12,17 @@ mod drift;
 mod holes;
 mod sight_lines;
 
-use std::sync::atomic::AtomicBool;
+use std::{borrow::Cow, sync::atomic::AtomicBool};
 
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 
 pub use super::look::OrthoimageLook;
 use super::{
-    adjust::{Adjusted, CorrectedImage},
+    adjust::Adjusted,
     image_pixels::PixelFiles,
     image_view::View,
+    interpolate_shots::ShotModel,
     map_surface::{AdjustmentOfImages, Surface, SurfaceModel},
     site_image::SiteImages,
     tag_times::ImageTimes,
@@ -31,15 +32,16 @@ use areograph_base::{
     error::{Cause, Result},
     watch::Watch,
 };
+use areograph_config::AdjustmentConfig;
 use areograph_geom::{height_grid::HeightGrid, pushbroom::Unseen};
 use areograph_store::{
     book::Book,
-    stage::{Output, Round, Stage},
+    stage::{Input, Inputs, Output, Round, Stage},
     stage_inputs,
 };
 
 use cells::Cells;
-use drift::drift_m;
+use drift::OrientationErrors;
 pub use holes::bridged;
 use sight_lines::SightLines;
 
@@ -47,20 +49,81 @@ use sight_lines::SightLines;
 pub(crate) const CELLS_MAX: usize = 1 << 27;
 
 stage_inputs! {
-    /// Images with their orientation and their pixels, and the terrain model.
+    /// Images with their orientation and their pixels, and the heights of the ground.
     pub struct RectifyImages<'a> {
         /// The images.
         pub images: SiteImages<'a>,
         /// Their pixels.
         pub pixels: PixelFiles<'a>,
-        /// The terrain model.
-        pub surface: &'a Output<Surface>,
+        /// The heights of the ground.
+        pub surface: GroundModel<'a>,
         /// The adjustment of the images, where there is one: images without tie points are left out.
         pub adjusted: AdjustmentOfImages<'a>,
+        /// Standard deviations of orientations from kernels.
+        pub priors: &'a AdjustmentConfig,
         /// The orientation of the images: from the kernels, or adjusted.
         pub round: Round,
         /// Edge of a cell, metres.
         pub cell_m: &'a f64,
+    }
+}
+
+/// The heights on which images are rectified.
+#[derive(Debug, Clone, Copy)]
+pub enum GroundModel<'a> {
+    /// A terrain model.
+    Terrain(&'a Output<Surface>),
+    /// The ground between the altimeter's shots.
+    Shots(&'a Output<ShotModel>),
+}
+
+impl Input for GroundModel<'_> {
+    fn add_to(&self, field: &str, inputs: &mut Inputs) {
+        match self {
+            Self::Terrain(surface) => surface.add_to(field, inputs),
+            Self::Shots(model) => model.add_to(field, inputs),
+        }
+    }
+}
+
+impl<'a> GroundModel<'a> {
+    /// The heights and their standard deviations; `None` where they are withheld.
+    ///
+    /// # Errors
+    /// An output that cannot be read.
+    pub fn model(self) -> Result<Option<&'a SurfaceModel>> {
+        Ok(match self {
+            Self::Terrain(surface) => surface.value()?.model(),
+            Self::Shots(model) => model.value()?.model.as_ref().ok(),
+        })
+    }
+
+    /// The heights in cells large enough for a page; `None` where they are withheld.
+    ///
+    /// # Errors
+    /// As [`Self::model`].
+    pub fn look(self) -> Result<Option<&'a HeightGrid>> {
+        Ok(match self {
+            Self::Terrain(surface) => {
+                let surface = surface.value()?;
+                surface.model().map(|_| &surface.account.look.heights)
+            }
+            Self::Shots(_) => self.model()?.map(|model| &model.heights),
+        })
+    }
+
+    /// The ground of the orthoimages of a site; `None` for a site without them, or with a model that is withheld.
+    ///
+    /// # Errors
+    /// An output that is not known or cannot be read.
+    pub fn of(book: &'a Book) -> Result<Option<&'a SurfaceModel>> {
+        if let Some(terrain) = book.find::<Surface>(Round::Initial)?
+            && let Some(model) = terrain.model()
+        {
+            return Ok(Some(model));
+        }
+        let shots = book.find::<ShotModel>(Round::Initial)?;
+        Ok(shots.and_then(|shots| shots.model.as_ref().ok()))
     }
 }
 
@@ -132,10 +195,11 @@ pub struct OrthoimageAccount {
     pub sigma_m: f64,
     /// Standard deviation due to jitter, metres; `None` where the adjustment does not measure it.
     pub jitter_m: Option<f64>,
-    /// Standard deviation due to drift, metres: errors of the orientation that change along the image; `None` without an
-    /// adjustment.
+    /// Standard deviation due to drift, metres: errors of the orientation that change along the image, by the adjustment, or by
+    /// the usual errors of kernels; `None` where neither is known.
     pub drift_m: Option<f64>,
-    /// Standard deviations of the shared error, east and north, metres; `None` without an adjustment with heights.
+    /// Standard deviations of the shared error, east and north, metres: of all images by an adjustment with heights, or of this
+    /// image by the usual errors of kernels; `None` for an adjustment without heights, and for support data.
     pub shared_sigma_m: Option<[f64; 2]>,
     /// The orthoimage in larger cells, for display.
     pub look: OrthoimageLook,
@@ -168,7 +232,7 @@ enum RectifyError {
 
 impl Stage for RectifyImages<'_> {
     const NAME: &'static str = "rectify_images";
-    const METHOD: u32 = 3;
+    const METHOD: u32 = 4;
     type Output = Vec<Orthoimage>;
     stage_inputs!(fingerprint);
 
@@ -181,11 +245,10 @@ impl Stage for RectifyImages<'_> {
     }
 
     fn run_watched(&self, watch: Watch<'_>) -> Result<Vec<Orthoimage>> {
-        let surface = self.surface.value()?;
         let (mut made, mut is_empty) = (Vec::new(), false);
-        if surface.account.is_refused {
+        let Some(surface) = self.surface.model()? else {
             return Ok(made);
-        }
+        };
         let tied = self.adjusted.0.map(Output::value).transpose()?;
         // It states nothing of orientations from kernels.
         let adjusted = tied.filter(|_| self.round != Round::Initial);
@@ -193,7 +256,11 @@ impl Stage for RectifyImages<'_> {
         let times = self.images.0.iter().map(|image| image.times.value());
         let times: Vec<&ImageTimes> = times.collect::<Result<_>>()?;
         let pixels = self.pixels.decoded(&times)?;
-        let model = bridged(&surface.model);
+        // Holes of a terrain model are narrow; between shots, empty cells are far from all of them.
+        let model = match self.surface {
+            GroundModel::Terrain(_) => Cow::Owned(bridged(surface)),
+            GroundModel::Shots(_) => Cow::Borrowed(surface),
+        };
         let images = oriented.iter().zip(&pixels).enumerate();
         for (index, (image, pixels)) in images {
             let Some(pixels) = pixels else { continue };
@@ -206,16 +273,34 @@ impl Stage for RectifyImages<'_> {
             if tied.is_some_and(|tied| !tied.is_tied(index)) {
                 continue;
             }
-            let adjustment = adjusted.and_then(|adjusted| AdjustedView::of(adjusted, index));
-            let orthoimage = rectified(&view, &model, *self.cell_m, adjustment, watch)?;
+            let of_view = if let Some(adjusted) = adjusted {
+                adjusted.images.get(index).map(|image| OrientedView {
+                    scatter_px: Some(adjusted.summary.tie_scatter_of_axes_px()),
+                    errors: OrientationErrors::adjusted(image),
+                })
+            } else {
+                // Support data and cubes may have any accuracy.
+                let from_kernels = times[index].support.is_none();
+                from_kernels.then(|| OrientedView {
+                    scatter_px: None,
+                    errors: OrientationErrors::a_priori(
+                        &view,
+                        self.priors,
+                        times[index].instrument.spacecraft,
+                    ),
+                })
+            };
+            let orthoimage = rectified(&view, &model, *self.cell_m, of_view.as_ref(), watch)?;
             let Some(mut orthoimage) = orthoimage else {
                 is_empty = true;
                 continue;
             };
             let account = &mut orthoimage.account;
             account.image = index;
-            account.interpolated = interpolated(&orthoimage.sigmas_m, &surface.model);
-            account.shared_sigma_m = adjusted.and_then(shared_sigma_m);
+            account.interpolated = interpolated(&orthoimage.sigmas_m, surface);
+            if let Some(adjusted) = adjusted {
+                account.shared_sigma_m = shared_sigma_m(adjusted);
+            }
             made.push(orthoimage);
         }
         // The images of the model show it, so that only cells larger than they are leave nothing.
@@ -227,21 +312,12 @@ impl Stage for RectifyImages<'_> {
     }
 }
 
-/// What an adjustment states of the orientation of an image.
-#[derive(Debug, Clone, Copy)]
-struct AdjustedView<'a> {
-    /// Scatter of tie points along and across the track, focal-plane pixels.
-    scatter_px: [f64; 2],
-    image: &'a CorrectedImage,
-}
-
-impl<'a> AdjustedView<'a> {
-    fn of(adjusted: &'a Adjusted, index: usize) -> Option<Self> {
-        Some(Self {
-            scatter_px: adjusted.summary.tie_scatter_of_axes_px(),
-            image: adjusted.images.get(index)?,
-        })
-    }
+/// What is known of the orientation of an image.
+#[derive(Debug)]
+struct OrientedView {
+    /// Scatter of tie points along and across the track, focal-plane pixels, where an adjustment measured it.
+    scatter_px: Option<[f64; 2]>,
+    errors: OrientationErrors,
 }
 
 /// Number of shown cells whose height is not one of the terrain model.
@@ -262,7 +338,7 @@ fn rectified(
     view: &View<'_>,
     model: &SurfaceModel,
     cell_m: f64,
-    adjustment: Option<AdjustedView<'_>>,
+    of_view: Option<&OrientedView>,
     watch: Watch<'_>,
 ) -> Result<Option<Orthoimage>> {
     watch.check()?;
@@ -270,10 +346,12 @@ fn rectified(
         return Ok(None);
     };
     // Jitter in pitch and in roll displaces along and across the track.
-    let scatter_px = adjustment.map(|of| Vector2::from(of.scatter_px).norm());
+    let scatter_px = of_view.and_then(|of| of.scatter_px);
+    let scatter_px = scatter_px.map(|scatter_px| Vector2::from(scatter_px).norm());
     let scatter_px = scatter_px.filter(|scatter_px| *scatter_px > 0.0);
     let jitter_m = scatter_px.map(|scatter_px| scatter_px * sight_lines.focal_pixel_m);
-    let drift_m = adjustment.map(|of| drift_m(view, of.image, sight_lines.radius_m));
+    let plan = of_view.map(|of| of.errors.plan_sigmas(view, sight_lines.radius_m));
+    let drift_m = plan.map(|plan| plan.drift_m);
     let of_orientation_m = jitter_m
         .unwrap_or_default()
         .hypot(drift_m.unwrap_or_default());
@@ -303,7 +381,7 @@ fn rectified(
         sigma_m: (square_m2 / known.count().max(1) as f64).sqrt(),
         jitter_m,
         drift_m,
-        shared_sigma_m: None,
+        shared_sigma_m: plan.map(|plan| plan.shared_m),
         look: OrthoimageLook::of(&brightness.cells),
     };
     Ok(Some(Orthoimage {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use areograph_base::{
     error::{Cause, Locate as _, Result},
-    instruments::{DetectorLine, Instrument},
+    instruments::{Calibrated, DetectorLine, Instrument},
     units::RADIANS_PER_DEGREE,
 };
 use areograph_geom::{attitude::bus_to_camera, pushbroom::Detector};
@@ -54,12 +54,10 @@ enum ForeignCalibration {
 
 /// A camera of a calibration.
 pub(crate) struct CalibratedCamera {
-    /// The uncalibrated camera with calibrated mounting, optics, detector line and distortion.
+    /// The uncalibrated camera with calibrated mounting, optics, detector line and distortion; it does not name its calibration.
     pub(crate) camera: Instrument,
-    /// Its name in the calibration.
-    pub(crate) name: String,
-    /// The calibration.
-    pub(crate) calibration: String,
+    /// The calibration, of another orbit.
+    pub(crate) origin: Calibrated,
     /// Its calibrated support data.
     pub(crate) file: PathBuf,
     /// Largest change of a look direction in the frame of the bus, radians.
@@ -110,7 +108,6 @@ pub(crate) fn calibrated_camera<'a>(
                 ..found.detector
             },
             distortion: found.distortion,
-            calibration: Some(of.clone()),
             ..camera.clone()
         };
         let moved_rad = moved_rad(camera, &calibrated);
@@ -121,8 +118,10 @@ pub(crate) fn calibrated_camera<'a>(
         }
         return Ok(Some(CalibratedCamera {
             camera: calibrated,
-            name: of.camera,
-            calibration: of.calibration,
+            origin: Calibrated {
+                is_of_other_orbit: true,
+                ..of
+            },
             file: file.to_owned(),
             moved_rad,
         }));

@@ -69,14 +69,7 @@ impl<'a> View<'a> {
 
     /// Point where the ray of a place meets a sphere, metres; `None` where the ray misses the sphere.
     pub(crate) fn on_sphere_m(&self, place: &Vector2<f64>, radius_m: f64) -> Option<Vector3<f64>> {
-        let (x_lines, _) = self.camera.focal_plane_coordinates(place.x, place.y);
-        let pose = self.camera.orientation.pose(x_lines);
-        let look = self.camera.detector.look(place.y);
-        let direction = pose.mars_to_camera.tr_mul(&look).normalize();
-        let along_m = -pose.position_m.dot(&direction);
-        let square_m2 = radius_m * radius_m - (pose.position_m.norm_squared() - along_m * along_m);
-        (square_m2 >= 0.0 && along_m > 0.0)
-            .then(|| pose.position_m + (along_m - square_m2.sqrt()) * direction)
+        self.camera.on_sphere_m(place.x, place.y, radius_m)
     }
 
     /// The ground of a place by a priori heights, and the standard deviation of its height, metres.

@@ -15,6 +15,6 @@ pub mod mola_surface;
 pub mod orientation;
 pub mod oriented;
 pub(crate) mod raster;
-pub(crate) mod shot_heights;
+pub mod shot_heights;
 pub mod site_image;
 pub(crate) mod turn;

@@ -138,6 +138,22 @@ impl MolaShots {
         LaserSurface::new(&self.shots, around, &self.options(options))
     }
 
+    /// The same without the shifts in plan that `crossed` shows.
+    ///
+    /// # Errors
+    /// Too few shots.
+    pub(crate) fn shifted_surface(
+        &self,
+        crossed: &CrossedProfiles,
+        around: &[Vector3<f64>],
+        options: &SurfaceOptions,
+    ) -> Result<LaserSurface, SurfaceError> {
+        let plan_m = options.profile_plan_sigma_m;
+        let shifts = crossed.net.plan_shifts(&crossed.crossovers, plan_m);
+        let shifts = shifts.unwrap_or_default();
+        LaserSurface::with_plan_shifts(&self.shots, around, &self.options(options), &shifts)
+    }
+
     /// Every profile separately, with its index, those with most shots first.
     #[must_use]
     pub fn by_profile(&self) -> Vec<(usize, Self)> {

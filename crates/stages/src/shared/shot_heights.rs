@@ -16,20 +16,23 @@ const SIGMA_MIN_M: f64 = 10.0;
 const SIGMA_WITHOUT_SHOTS_M: f64 = 2_000.0;
 
 /// A priori heights of the ground.
-pub(crate) struct Heights {
+pub struct Heights {
     body: Body,
     shots_m: Vec<Vector3<f64>>,
 }
 
-/// A radius with its standard deviation, metres.
-pub(crate) struct Height {
-    pub(crate) radius_m: f64,
-    pub(crate) sigma_m: f64,
+/// Height of the ground as a radius.
+pub struct Height {
+    /// Distance from the centre of the body, metres.
+    pub radius_m: f64,
+    /// Its standard deviation, metres.
+    pub sigma_m: f64,
 }
 
 impl Heights {
     /// Heights from shots at these places, body-fixed, metres.
-    pub(crate) const fn at(body: Body, shots_m: Vec<Vector3<f64>>) -> Self {
+    #[must_use]
+    pub const fn at(body: Body, shots_m: Vec<Vector3<f64>>) -> Self {
         Self { body, shots_m }
     }
 
@@ -46,9 +49,15 @@ impl Heights {
         Self::at(footprints.body, shots.collect())
     }
 
+    /// Their shots, body-fixed, metres.
+    pub(crate) fn shots_m(&self) -> &[Vector3<f64>] {
+        &self.shots_m
+    }
+
     /// The height at a place, metres body-fixed, of which only the direction is used: the mean of the nearest shots,
     /// weighted by proximity. Its standard deviation grows with the distance from them.
-    pub(crate) fn near(&self, place_m: &Vector3<f64>) -> Height {
+    #[must_use]
+    pub fn near(&self, place_m: &Vector3<f64>) -> Height {
         let direction = place_m.normalize();
         let mut nearest: Vec<(f64, f64)> = Vec::with_capacity(SHOTS + 1);
         for shot_m in &self.shots_m {

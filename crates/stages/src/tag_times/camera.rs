@@ -107,13 +107,23 @@ pub(super) fn calibrated(
     let Some(found) = calibrated_camera(&camera, names, paths)? else {
         return Ok(camera);
     };
-    notes.extend(found.camera.calibration.as_ref().map(calibrated_note));
-    remarks.push(Disagreement::from(format!(
-        "the offset angles of the calibration {} contain the mean error of the calibrated orbit, which the stated standard \
-         deviations do not include",
-        found.calibration
-    )));
-    Ok(found.camera)
+    notes.push(calibrated_note(&found.origin));
+    remarks.extend(other_orbit_remark(&found.origin));
+    Ok(Instrument {
+        calibration: Some(found.origin),
+        ..found.camera
+    })
+}
+
+/// A remark on a camera that was calibrated in another orbit.
+pub(super) fn other_orbit_remark(of: &Calibrated) -> Option<Disagreement> {
+    of.is_of_other_orbit.then(|| {
+        Disagreement::from(format!(
+            "the offset angles of the calibration {} contain the mean error of the calibrated orbit, which the stated \
+             standard deviations do not include",
+            of.calibration
+        ))
+    })
 }
 
 /// A note on an image with a calibrated camera.
@@ -178,6 +188,7 @@ mod tests {
                 calibration: "orbit".to_owned(),
                 camera: "line".to_owned(),
                 valid: true,
+                is_of_other_orbit: false,
             });
             camera_agrees(&camera, all_instruments())
         };

@@ -9,6 +9,7 @@ use super::{
     Disagreement, ImageTimes, StartFrom,
     agreement::{mounting_agrees, of_one_clock, of_one_product, start_agrees, stop_agrees},
     calibrated_note,
+    camera::other_orbit_remark,
     camera::{camera_agrees, known_one},
     detector::within_detector,
 };
@@ -117,6 +118,7 @@ pub(super) fn supported(
     let mut notes = vec![file.note()];
     if let Some(of) = &said.instrument.calibration {
         notes.push(calibrated_note(of));
+        remarks.extend(other_orbit_remark(of));
         remarks.extend((!of.valid).then(|| {
             let name = &of.calibration;
             Disagreement::from(format!(

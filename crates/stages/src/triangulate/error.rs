@@ -102,10 +102,21 @@ pub enum NetError {
         /// The point.
         point: String,
     },
+    /// A picture without ticks, in a net whose film is corrected.
+    #[error(
+        "picture {picture} has no ticks, and film.files corrects the other pictures; expected ticks of every picture"
+    )]
+    #[cause(
+        "give the four corner ticks of the picture; for coordinates without distortion, known_x and known_y are x and y"
+    )]
+    NoTicks {
+        /// The picture.
+        picture: String,
+    },
     /// Ticks that give no correction.
     #[error("the film of picture {picture}: {problem}")]
     #[cause(
-        "give the four corner ticks of the picture, and either none or all four of the mid-edge ticks"
+        "give each of the four corner ticks of the picture once, and either none or all four of the mid-edge ticks"
     )]
     Film {
         /// The picture.

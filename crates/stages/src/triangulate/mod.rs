@@ -65,7 +65,7 @@ impl Input for NetFiles<'_> {
 
 impl Stage for Triangulate<'_> {
     const NAME: &'static str = "triangulate";
-    const METHOD: u32 = 14;
+    const METHOD: u32 = 15;
     type Output = Triangulation;
     stage_inputs!(fingerprint);
 

@@ -6,13 +6,16 @@ use std::{
 };
 
 use super::error::{NetError, film};
-use areograph_base::{error::Result, units::RADIANS_PER_DEGREE};
+use areograph_base::{
+    error::{Locate as _, Result},
+    units::RADIANS_PER_DEGREE,
+};
 use areograph_config::{NetConfig, YAxis};
 use areograph_geom::plane::{Control, CornerZero, FourCorners, Measurement, Net, Place};
 use areograph_pds::{
     plane_tables::{
-        ControlPlace, PictureRow, TickRow, read_controls, read_measurements, read_pictures,
-        read_ticks,
+        CORNER_TICKS, ControlPlace, EDGE_TICKS, PictureRow, TickRow, read_controls,
+        read_measurements, read_pictures, read_ticks,
     },
     table_rows::Rows,
 };
@@ -52,19 +55,18 @@ pub struct NetData {
 pub fn read_net(config: &NetConfig) -> Result<NetData> {
     let mut data = NetData::default();
     let mut index = Index::default();
-    let mut ticks: BTreeMap<String, Vec<TickRow>> = BTreeMap::new();
-    for path in &config.film.files {
-        for row in data.take(path, read_ticks(path)?) {
-            ticks.entry(row.picture.clone()).or_default().push(row);
-        }
-    }
-    let films = films(&ticks)?;
+    let films = films(config, &mut data)?;
     for path in &config.measurements.files {
         let rows = data.take(path, read_measurements(path)?);
         for row in rows {
-            let corrected = films
-                .get(&row.picture)
-                .map_or(row.at, |film| film.correct(row.at));
+            let corrected = match films.get(&row.picture) {
+                Some(film) => film.correct(row.at),
+                None if films.is_empty() => row.at,
+                None => {
+                    let picture = row.picture;
+                    return Err(NetError::NoTicks { picture }).in_file(path);
+                }
+            };
             let at = match config.measurements.y_axis {
                 YAxis::Up => corrected,
                 YAxis::Down => corrected.conj(),
@@ -239,39 +241,62 @@ impl Film {
     }
 }
 
-fn films(
-    ticks: &BTreeMap<String, Vec<TickRow>>,
-) -> std::result::Result<BTreeMap<String, Film>, NetError> {
-    let films = ticks.iter().map(|(picture, ticks)| {
-        let tick = |index: usize| {
-            let found = ticks.iter().find(|tick| tick.tick == index);
-            found.ok_or_else(|| NetError::Film {
-                picture: picture.clone(),
-                problem: "a tick is missing".to_owned(),
-            })
-        };
-        let corners = [tick(0)?, tick(1)?, tick(2)?, tick(3)?];
-        let known = corners.map(|tick| tick.known);
-        let mapping = FourCorners::new(&corners.map(|tick| tick.measured), &known)
-            .map_err(|problem| film(picture, problem))?;
-        let bend = if ticks.iter().any(|tick| tick.tick >= 4) {
-            let [lower, upper, left, right] = [tick(4)?, tick(5)?, tick(6)?, tick(7)?];
-            let rest = |tick: &TickRow| mapping.correct(tick.measured) - tick.known;
-            let size = known[2] - known[0];
-            let rests = [
-                [rest(lower).re, rest(upper).re],
-                [rest(left).im, rest(right).im],
-            ];
-            let bend = CornerZero::new(known[0], size.re, size.im, rests);
-            Some(bend.map_err(|problem| film(picture, problem))?)
-        } else {
-            None
-        };
-        let film = Film {
-            corners: mapping,
-            bend,
-        };
-        Ok((picture.clone(), film))
+/// The corrections of all pictures with ticks.
+fn films(config: &NetConfig, data: &mut NetData) -> Result<BTreeMap<String, Film>> {
+    let mut ticks: BTreeMap<String, (&Path, Vec<TickRow>)> = BTreeMap::new();
+    let mut skipped: BTreeMap<&Path, String> = BTreeMap::new();
+    for path in &config.film.files {
+        let table = read_ticks(path)?;
+        if let Some((line, text)) = table.complaints.first() {
+            skipped.insert(path, format!("; line {line} was skipped: {text}"));
+        }
+        for row in data.take(path, table) {
+            let of_picture = ticks.entry(row.picture.clone());
+            let (_, rows) = of_picture.or_insert_with(|| (path, Vec::new()));
+            rows.push(row);
+        }
+    }
+    let films = ticks.into_iter().map(|(picture, (path, ticks))| {
+        let skipped = skipped.get(path).map_or("", String::as_str);
+        let film = film_of(&picture, &ticks, skipped).in_file(path)?;
+        Ok((picture, film))
     });
     films.collect()
+}
+
+/// The correction of a picture by its ticks, each given once; `skipped` describes rows that could not be read.
+fn film_of(picture: &str, ticks: &[TickRow], skipped: &str) -> std::result::Result<Film, NetError> {
+    let tick = |index: usize| {
+        let problem = |what: &str| NetError::Film {
+            picture: picture.to_owned(),
+            problem: format!("tick {} {what}", [CORNER_TICKS, EDGE_TICKS].concat()[index]),
+        };
+        let mut found = ticks.iter().filter(|tick| tick.tick == index);
+        match (found.next(), found.next()) {
+            (Some(tick), None) => Ok(tick),
+            (Some(_), Some(_)) => Err(problem("has two rows")),
+            (None, _) => Err(problem(&format!("is missing{skipped}"))),
+        }
+    };
+    let corners = [tick(0)?, tick(1)?, tick(2)?, tick(3)?];
+    let known = corners.map(|tick| tick.known);
+    let mapping = FourCorners::new(&corners.map(|tick| tick.measured), &known)
+        .map_err(|problem| film(picture, problem))?;
+    let bend = if ticks.iter().any(|tick| tick.tick >= 4) {
+        let [lower, upper, left, right] = [tick(4)?, tick(5)?, tick(6)?, tick(7)?];
+        let rest = |tick: &TickRow| mapping.correct(tick.measured) - tick.known;
+        let size = known[2] - known[0];
+        let rests = [
+            [rest(lower).re, rest(upper).re],
+            [rest(left).im, rest(right).im],
+        ];
+        let bend = CornerZero::new(known[0], size.re, size.im, rests);
+        Some(bend.map_err(|problem| film(picture, problem))?)
+    } else {
+        None
+    };
+    Ok(Film {
+        corners: mapping,
+        bend,
+    })
 }

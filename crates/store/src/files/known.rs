@@ -41,6 +41,17 @@ impl Identity {
         }
     }
 
+    /// Whether both are the same unchanged file. Computers number the device of a shared file system differently; inode
+    /// and times are those of its server.
+    #[must_use]
+    pub fn is_same_file(&self, other: &Self) -> bool {
+        Self { device: 0, ..*self }
+            == Self {
+                device: 0,
+                ..*other
+            }
+    }
+
     /// Whether the file had been unchanged for a while at `instant`, so that any later change shows in its times.
     #[must_use]
     pub fn is_steady(&self, instant: SystemTime) -> bool {
@@ -123,5 +134,31 @@ mod tests {
         assert!(!of([90, 0], [100, 0]).is_steady(at(101, 0)));
         assert!(!of([i64::MAX, 0], [0, 0]).is_steady(at(1_000, 0)));
         assert!(!file.is_steady(UNIX_EPOCH));
+    }
+
+    #[test]
+    fn a_file_is_the_same_on_another_computer_unless_it_changed() {
+        let file = Identity {
+            device: 1,
+            inode: 2,
+            bytes: 3,
+            modified: [4, 5],
+            changed: [6, 7],
+        };
+        assert!(file.is_same_file(&Identity { device: 9, ..file }));
+        for other in [
+            Identity { inode: 9, ..file },
+            Identity { bytes: 9, ..file },
+            Identity {
+                modified: [4, 9],
+                ..file
+            },
+            Identity {
+                changed: [6, 9],
+                ..file
+            },
+        ] {
+            assert!(!file.is_same_file(&other));
+        }
     }
 }

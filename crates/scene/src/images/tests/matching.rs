@@ -113,6 +113,18 @@ impl Mission {
         path
     }
 
+    /// The site without tie points and terrain model, with orthoimages on the ground between shots.
+    fn site_on_shots(&self, site: &str) -> PathBuf {
+        let text = fs::read_to_string(self.folder.join(format!("sites/{site}.toml"))).unwrap();
+        let given = format!("[ties]\nfiles = [\"../ties/{site}.csv\"]\n");
+        assert!(text.contains(&given), "{text}");
+        let text = text.replace(&given, "");
+        let named = text.replace("site = \"", "site = \"on_shots_");
+        let path = self.folder.join(format!("sites/on_shots_{site}.toml"));
+        fs::write(&path, named + "\n[surface]\northoimage_cell_m = 5.0\n").unwrap();
+        path
+    }
+
     /// The same site with the pixels of one image as a cube of ISIS, and of the other as a TIFF.
     fn in_other_files(&self, site: &str) -> PathBuf {
         let name = |path: &Path, ending: &str| path.with_extension(ending);

@@ -296,6 +296,66 @@ pub(super) fn judged(mission: &Mission, products: &Path) -> (Vec<Judged>, f64) {
     (judged, apart)
 }
 
+/// The orthoimages of a site on the ground between shots; empty for an invalid site.
+fn on_shots(mission: &Mission, site: &Site, out: &Path) -> Vec<Judged> {
+    let (products, is_valid) = published(&mission.site_on_shots(site.id), out);
+    if !is_valid {
+        return Vec::new();
+    }
+    let document = fs::read(products.join("orthoimages.json")).unwrap();
+    let document: serde_json::Value = serde_json::from_slice(&document).unwrap();
+    let of_image = |stated: &serde_json::Value| {
+        let id = stated["image"].as_str().unwrap();
+        let orthoimage = Published::of(&products, id, "orthoimage.tif");
+        Judged::of(id, &errors_m(mission, id, &orthoimage), stated)
+    };
+    let all = document["orthoimages"].as_array().unwrap();
+    all.iter().map(of_image).collect()
+}
+
+/// Images with the orientation from the kernels, whose errors have other sizes in every mission.
+#[test]
+fn orthoimages_on_the_ground_between_shots_are_where_they_state() {
+    if !areograph_testing::long() {
+        return;
+    }
+    let roughness = [Roughness::Medium, Roughness::Plains, Roughness::Varied];
+    let mut all = Vec::new();
+    for (seed, roughness) in (31_001..).zip(roughness) {
+        let options = SceneOptions {
+            seed,
+            errors: SceneErrors::realistic(roughness).with_drawn_sizes(seed),
+            ..SceneOptions::default()
+        };
+        let sites: Vec<&Site> = SITES.to_vec();
+        let folder = tempfile::tempdir().unwrap();
+        let mission = Mission::flown(&folder.path().join("mission"), &sites, &options);
+        for site in sites {
+            all.extend(on_shots(&mission, site, folder.path()));
+        }
+    }
+    let means = all
+        .iter()
+        .flat_map(|of| of.mean.map(|[error_m, sigma_m]| error_m / sigma_m));
+    let means: Vec<f64> = means.collect();
+    let square = means.iter().map(|of| of * of).sum::<f64>() / means.len() as f64;
+    let sums = [0, 1].map(|of| {
+        all.iter()
+            .map(|judged| judged.about[of].powi(2))
+            .sum::<f64>()
+    });
+    let ratio = (sums[0] / sums[1]).sqrt();
+    println!(
+        "{} orthoimages on the ground between shots: mean {:.2}, about it {ratio:.2}",
+        all.len(),
+        square.sqrt()
+    );
+    assert!(means.iter().all(|of| of.abs() <= 3.0));
+    // 16 images have 32 axes: chance alone gives 1 ± 0.13, and two of these are allowed. Jitter is not stated.
+    assert!((0.74..=1.26).contains(&square.sqrt()));
+    assert!((0.7..=1.4).contains(&ratio));
+}
+
 #[test]
 fn orthoimages_of_realistic_missions_are_where_they_state() {
     if !areograph_testing::long() {
