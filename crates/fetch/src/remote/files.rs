@@ -144,7 +144,8 @@ impl Elsewhere for RemoteFiles {
             .failed
             .into_inner()
             .unwrap_or_else(PoisonError::into_inner);
-        failed.sort_by_key(|(part, _)| *part);
+        // Requests that wait for a server that goes are refused before the failure of its last request is entered.
+        failed.sort_by_key(|(part, failure)| (*part, is_refused(failure)));
         failed
     }
 
@@ -153,7 +154,8 @@ impl Elsewhere for RemoteFiles {
             if self.fill(part, buffer)? {
                 return Ok(());
             }
-            if let Some((_, failure)) = self.bring(std::slice::from_ref(part), &RUN_ON).pop() {
+            let failed = self.bring(std::slice::from_ref(part), &RUN_ON);
+            if let Some((_, failure)) = failed.into_iter().next() {
                 return Err(failure);
             }
         }
@@ -322,6 +324,12 @@ impl RemoteFiles {
             (known.has_answered, known.down) = (false, Some(Instant::now()));
         }
     }
+}
+
+/// Whether a request was not made because another one had failed.
+fn is_refused(failure: &Error) -> bool {
+    let cause: &dyn std::error::Error = &*failure.cause;
+    matches!(cause.downcast_ref(), Some(RemoteError::Down { .. }))
 }
 
 /// Runs of blocks that are requested together.
