@@ -4,6 +4,7 @@ use std::{
     fs,
     os::unix::fs::symlink,
     path::{Path, PathBuf},
+    time::Duration,
 };
 
 use chrono::DateTime;
@@ -213,10 +214,27 @@ pub fn tidy(site_folder: &Path) -> Result<Vec<PathBuf>> {
             published.push(path);
         } else if path.is_dir() {
             remove(&path)?;
+        } else if is_old_bar(&path) {
+            // One that remains does no harm.
+            let _ = fs::remove_file(&path);
         }
     }
     published.sort();
     Ok(published)
+}
+
+/// Whether a file took the name of a run ([`bar`](crate::worker::run_folder::bar)) so long ago that its worker has ended.
+fn is_old_bar(path: &Path) -> bool {
+    // The longest lease is a day.
+    const OLD: Duration = Duration::from_hours(48);
+    let metadata = fs::symlink_metadata(path);
+    metadata.is_ok_and(|of| {
+        let age = of
+            .modified()
+            .ok()
+            .and_then(|changed| changed.elapsed().ok());
+        of.is_file() && of.len() == 0 && age.is_some_and(|age| age > OLD)
+    })
 }
 
 #[cfg(test)]
