@@ -171,7 +171,9 @@ fn fruit<W: Workers>(core: &Core<W>, attempt: &Attempt, ended: &Ended) -> Stored
     };
     let products = core.shared.config().outputs.products.clone();
     let folder = runs(&products, &attempt.site).join(&attempt.run);
-    if ended.answer.is_none() && core.shared.config().executor.kind == ExecutorKind::Slurm {
+    let is_on_cluster = core.shared.config().executor.kind == ExecutorKind::Slurm;
+    let has_begun = !matches!(ended.how, How::NotStarted(_));
+    if is_on_cluster && has_begun && ended.answer.is_none() {
         // A worker on a lost node may still work: it publishes before this, or not at all.
         bar(&folder).unwrap_or_else(|failure| tracing::warn!("{failure}"));
     }

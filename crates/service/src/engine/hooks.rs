@@ -1,10 +1,6 @@
 //! Hooks: programs run without a shell, with JSON on their standard input, for at most 30 s.
 
-use std::{
-    path::PathBuf,
-    process::Stdio,
-    time::Duration,
-};
+use std::{path::PathBuf, process::Stdio, time::Duration};
 
 use rustix::fs::{Access, access};
 use rustix::process::{Pid, Signal, kill_process_group};

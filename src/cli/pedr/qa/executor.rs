@@ -183,19 +183,33 @@ impl ArchiveWorkers for SlurmTasks<'_> {
 /// Numbers of successive files of each task: tasks of about equal size, at most `limit` unless a file is larger.
 fn parts(bytes: &[u64], limit: u64) -> Vec<usize> {
     let all: u64 = bytes.iter().sum();
-    let size = all.div_ceil(all.div_ceil(limit).max(1));
-    let mut parts: Vec<usize> = Vec::new();
-    let mut filled = u64::MAX;
-    for bytes in bytes {
-        match parts.last_mut() {
-            // A file belongs to the task that contains its middle.
-            Some(count) if filled + bytes / 2 < size && filled + bytes <= limit => *count += 1,
-            _ => {
-                parts.push(1);
-                filled = 0;
-            }
+    let mut tasks = all.div_ceil(limit).max(1);
+    loop {
+        let parts = equal_parts(bytes, tasks);
+        let mut rest = bytes;
+        let fits = parts.iter().all(|count| {
+            let (part, later) = rest.split_at(*count);
+            rest = later;
+            part.len() == 1 || part.iter().sum::<u64>() <= limit
+        });
+        if fits {
+            return parts;
         }
-        filled += bytes;
+        tasks += (tasks / 16).max(1);
+    }
+}
+
+/// Numbers of successive files of each of some parts of equal size; a file belongs to the part that contains its middle.
+fn equal_parts(bytes: &[u64], tasks: u64) -> Vec<usize> {
+    let doubled: u128 = 2 * bytes.iter().copied().map(u128::from).sum::<u128>().max(1);
+    let (mut parts, mut last, mut before) = (Vec::new(), None, 0);
+    for bytes in bytes.iter().copied().map(u128::from) {
+        let part = (2 * before + bytes) * u128::from(tasks) / doubled;
+        match parts.last_mut() {
+            Some(count) if last == Some(part) => *count += 1,
+            _ => parts.push(1),
+        }
+        (last, before) = (Some(part), before + bytes);
     }
     parts
 }
@@ -226,7 +240,8 @@ mod tests {
     fn tasks_have_about_the_same_size_and_every_file_one_task() {
         assert_eq!(parts(&[], 100), [0_usize; 0]);
         assert_eq!(parts(&[10; 10], 100), [10]);
-        assert_eq!(parts(&[10; 11], 100), [6, 5]);
+        assert_eq!(parts(&[10; 11], 100), [5, 6]);
+        assert_eq!(parts(&[326; 61], 5_000), [12, 12, 13, 12, 12]);
         assert_eq!(parts(&[500, 10, 10, 500], 100), [1, 2, 1]);
         assert_eq!(parts(&[0, 0, 0], 1), [3]);
         // Files of the mission: 15 to 40 MB.
