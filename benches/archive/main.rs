@@ -124,6 +124,7 @@ impl Archive {
             kernels: &self.kernels(),
             clock: clock(),
             allow_uncovered: false,
+            workers: None,
         };
         let options = RunOptions {
             out: out.to_owned(),

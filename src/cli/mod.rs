@@ -27,6 +27,7 @@ mod scene;
 mod serve;
 mod service;
 mod single;
+mod slurm;
 mod stop;
 mod triangulate;
 mod windows;
@@ -126,6 +127,8 @@ enum Command {
     Worker(worker::Arguments),
     #[command(hide = true)]
     CampaignTask(campaign::TaskArguments),
+    #[command(hide = true)]
+    ArchiveTask(pedr::TaskArguments),
 }
 
 /// Parses the command line, runs the command and reports failures on standard error.
@@ -158,7 +161,10 @@ pub fn main_of(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>)
 fn log(cli: &Cli) {
     // The log is the only account of an unattended command.
     let unattended = match &cli.command {
-        Command::Worker(_) | Command::CampaignTask(_) | Command::Nightly(_) => true,
+        Command::Worker(_)
+        | Command::CampaignTask(_)
+        | Command::ArchiveTask(_)
+        | Command::Nightly(_) => true,
         Command::Serve(arguments) => arguments.init.is_none(),
         _ => false,
     };
@@ -216,6 +222,7 @@ fn run(command: Command) -> ExitCode {
         Command::Man(arguments) => finish(man::run(&arguments)),
         Command::Worker(arguments) => worker::run(&arguments),
         Command::CampaignTask(arguments) => campaign::run_task(&arguments),
+        Command::ArchiveTask(arguments) => pedr::run_task(&arguments),
     }
 }
 
@@ -299,7 +306,7 @@ mod tests {
         if !help.contains("Example") {
             found.push(named.to_owned());
         }
-        let hidden = ["worker", "campaign-task", "help"];
+        let hidden = ["worker", "campaign-task", "archive-task", "help"];
         let own = |command: &&mut clap::Command| !hidden.contains(&command.get_name());
         for command in command.get_subcommands_mut().filter(own) {
             let named = format!("{named} {}", command.get_name());

@@ -18,6 +18,7 @@ use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
 
+pub(super) use self::qa::{TaskArguments, run_task};
 use super::finish;
 
 /// Inspects PEDR files.

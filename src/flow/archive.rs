@@ -1,7 +1,7 @@
 //! An archive of PEDR files from its folder to its products: every shot against the kernels.
 //!
 //! ```text
-//!  list files ─► per file, unless its result is stored:  load ─► check ─► store
+//!  list files ─► per file, unless its result is stored:  load ─► check ─► store        here, or in other processes
 //!                                    one thread, with CSPICE      all threads
 //!  results in order of time, every shot once ─► shots of the worst profiles ─► verdict ─► products, manifest last
 //! ```
@@ -16,22 +16,22 @@
 //! journal and manifest are handled as for a net.
 
 mod checker;
+mod checking;
 mod gather;
 mod loader;
 mod manifest;
+mod task;
 
 use std::{
     cell::RefCell,
     collections::BTreeMap,
     path::{Path, PathBuf},
-    sync::mpsc::sync_channel,
-    thread,
 };
 
+pub use self::task::{ArchiveFile, ArchiveTask, ArchiveWorkers};
 use self::{
-    checker::{Checker, FILES, Results},
+    checker::Results,
     gather::{Gathered, file_failure, gather},
-    loader::Loader,
     manifest::manifest,
 };
 use super::driver::{Driver, Flow, Ledger, MadeFrom, Publication};
@@ -39,7 +39,7 @@ use crate::{
     altimetry::{MolaClock, ShotFilter},
     config::RangeCheckConfig,
     error::{Cause, Error, Kind, Result, Stopped},
-    files::{Identity, InputFiles, file_name},
+    files::{Identity, file_name},
     pds::{archive::Listing, pedr::RULES},
     products::{
         ArchiveProducts, Product, WorstProfile, write_archive_products, write_profile_shots,
@@ -55,13 +55,11 @@ use crate::{
         judge::Verdict,
     },
     store::{
-        cache::StageCache,
         manifest::Manifest,
         publish::{entries, publish, read_manifest, staging},
     },
     time::Et,
     units::RADIANS_PER_DEGREE,
-    watch::Watch,
 };
 
 /// Stands for the name of a site in messages and in the manifest.
@@ -86,6 +84,8 @@ pub struct ArchiveRequest<'a> {
     pub clock: MolaClock,
     /// Whether shots without a position in the kernels leave the archive valid.
     pub allow_uncovered: bool,
+    /// Other processes that check files before this one checks the rest.
+    pub workers: Option<&'a dyn ArchiveWorkers>,
 }
 
 /// No file to check.
@@ -119,12 +119,7 @@ pub fn archive_filter() -> ShotFilter {
 pub(super) fn archive<D: Driver>(flow: &mut D, request: &ArchiveRequest<'_>) -> Flow<()> {
     flow.enter(STAGE)?;
     let kernels = KernelSet::from_metakernel_of(flow.files(), request.kernels)?;
-    let archive = Archive {
-        request,
-        limits: archive_limits(),
-        filter: archive_filter(),
-        view: KernelView::positions(Some(&kernels))?,
-    };
+    let archive = Archive::of(request, &kernels)?;
     let checked = archive.check_all(flow)?;
     let publication = ArchivePublication {
         archive: &archive,
@@ -197,7 +192,16 @@ impl Publication for ArchivePublication<'_> {
 #[cause(Bug: "this is a bug in areograph; please report it with the command")]
 struct NotChecked;
 
-impl Archive<'_> {
+impl<'a> Archive<'a> {
+    fn of(request: &'a ArchiveRequest<'a>, kernels: &KernelSet) -> Result<Self> {
+        Ok(Self {
+            request,
+            limits: archive_limits(),
+            filter: archive_filter(),
+            view: KernelView::positions(Some(kernels))?,
+        })
+    }
+
     const fn rules(&self) -> ArchiveRules<'_> {
         ArchiveRules {
             clock: &self.request.clock,
@@ -270,46 +274,6 @@ impl Archive<'_> {
         inputs.setting("file", &file_name(path));
         inputs.setting("identity", identity);
         (format!("{STAGE}/{}", &place[..32]), inputs)
-    }
-
-    /// Checks the files without stored results: this thread loads, while another one distributes the checks to all
-    /// threads of the pool.
-    fn check_todo(
-        &self,
-        files: &Files<'_>,
-        kernels: &InputFiles,
-        cache: &StageCache,
-        watch: Watch<'_>,
-    ) -> Result<Results> {
-        let session = self.view.session()?;
-        let todo = files.todo;
-        let checker = Checker {
-            rules: self.rules(),
-            kernels,
-            cache,
-            todo,
-            watch,
-        };
-        watch.announce(todo.len());
-        watch.step(0, FILES);
-        thread::scope(|scope| {
-            // The channel has no buffer: at most two loads are in memory.
-            let (parts, received) = sync_channel(0);
-            let worker = scope.spawn(|| checker.run(received));
-            let loader = Loader {
-                rules: self.rules(),
-                session,
-                stop: watch.stop(),
-                parts,
-            };
-            let paths = todo
-                .keys()
-                .map(|file| (*file, &*files.paths[*file], &files.sources[file]));
-            let loaded = loader.run(paths);
-            let checked = worker.join();
-            loaded?;
-            checked.unwrap_or_else(|panic| std::panic::resume_unwind(panic))
-        })
     }
 
     /// The results, and the failures of the other files.

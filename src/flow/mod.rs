@@ -46,7 +46,9 @@ mod task;
 mod triangulate;
 
 pub use answers::{check_answer, plan_answer, run_answer};
-pub use archive::{ArchiveRequest, archive_filter, archive_limits};
+pub use archive::{
+    ArchiveFile, ArchiveRequest, ArchiveTask, ArchiveWorkers, archive_filter, archive_limits,
+};
 pub use campaign::{
     CAMPAIGN, Campaign, CampaignAnswer, CampaignSite, Costs, End, InputSize, LeftOut, PlannedSite,
     SITES, SiteEnd, SiteTask, publish_results, run_site_file, select_campaign,

@@ -4,6 +4,7 @@
 
 mod hash;
 mod kernels;
+mod lease;
 mod limits;
 mod list;
 mod reporter;
@@ -25,7 +26,7 @@ use std::{
 };
 
 use crate::service::worker::protocol::{
-    ANSWER_MAX, Answer, Cancel, Failure, Line, PROTOCOL, Task, What,
+    ANSWER_MAX, Answer, Cancel, Failure, Here, Line, PROTOCOL, Task, What,
 };
 use crate::{
     column::lost_values,
@@ -34,6 +35,7 @@ use crate::{
     report::difference_page,
     store::{hashes::HashCache, lock::Busy, page::PagePath},
 };
+use lease::Lease;
 use reporter::Reporter;
 use shots::{Search, search};
 
@@ -55,8 +57,9 @@ struct Worker {
 /// Announces itself, reads a task from standard input, performs it and answers.
 ///
 /// * `parent` – the process of the service; the worker ends with it
+/// * `lease_s` – longest time without a line of the service, for a worker on another computer
 #[must_use]
-pub fn main(parent: Option<u32>) -> ExitCode {
+pub fn main(parent: Option<u32>, lease_s: Option<f64>) -> ExitCode {
     let interrupted = ExitCode::from(Kind::Interrupted.exit_code());
     if !limits::end_with(parent) {
         return interrupted;
@@ -79,8 +82,14 @@ pub fn main(parent: Option<u32>) -> ExitCode {
         Some(Ok(task)) => task,
     };
     let stop = Arc::new(AtomicBool::new(false));
-    // Without these two threads the worker could not be stopped, nor distinguished from one that hangs.
-    let threads = listen(&stop).and_then(|()| beat(&reporter));
+    let lease = Arc::new(Lease::new());
+    // Without these threads the worker could not be stopped, nor distinguished from one that hangs.
+    let threads = listen(&stop, &lease)
+        .and_then(|()| beat(&reporter))
+        .and_then(|()| match lease_s {
+            Some(lease_s) => lease.require(lease_s, &stop),
+            None => Ok(()),
+        });
     if let Err(error) = threads {
         return fail(&reporter, bug(format!("no thread can be started: {error}")));
     }
@@ -136,11 +145,15 @@ fn read_task() -> Option<std::result::Result<Task, String>> {
 }
 
 /// Sets `stop` when the service requests it or has ended.
-fn listen(stop: &Arc<AtomicBool>) -> std::io::Result<()> {
-    let stop = Arc::clone(stop);
+fn listen(stop: &Arc<AtomicBool>, lease: &Arc<Lease>) -> std::io::Result<()> {
+    let (stop, lease) = (Arc::clone(stop), Arc::clone(lease));
     let listener = move || {
         for line in std::io::stdin().lock().lines() {
             let Ok(line) = line else { break };
+            lease.renew();
+            if serde_json::from_str::<Here>(&line).is_ok() {
+                continue;
+            }
             match serde_json::from_str::<Cancel>(&line) {
                 Ok(Cancel { cancel }) => {
                     tracing::info!(?cancel, "the service requests a stop");
@@ -150,11 +163,16 @@ fn listen(stop: &Arc<AtomicBool>) -> std::io::Result<()> {
             }
         }
         tracing::warn!("the service has ended");
-        stop.store(true, Ordering::Relaxed);
-        thread::sleep(ORPHANED);
-        process::exit(i32::from(Kind::Interrupted.exit_code()));
+        end_orphaned(&stop);
     };
     thread::Builder::new().spawn(listener).map(drop)
+}
+
+/// Stops, and ends the process if it does not stop in time.
+fn end_orphaned(stop: &AtomicBool) -> ! {
+    stop.store(true, Ordering::Relaxed);
+    thread::sleep(ORPHANED);
+    process::exit(i32::from(Kind::Interrupted.exit_code()))
 }
 
 /// Starts the heartbeats.

@@ -10,8 +10,7 @@ use crate::common;
 
 use std::{
     collections::{BTreeMap, BTreeSet},
-    env, fs,
-    os::unix::fs::PermissionsExt as _,
+    fs,
     path::{Path, PathBuf},
     process::Command,
 };
@@ -22,6 +21,7 @@ use common::{
     files_below,
     golden::assert_messages,
     mission::{once, products, succeed},
+    slurm::{cluster, with_programs},
 };
 use serde_json::Value;
 
@@ -260,66 +260,14 @@ fn missing_files_leave_sites_out_and_wrong_campaigns_are_refused() {
     assert_messages("campaign_refused", &told);
 }
 
-/// Programs with the names of Slurm's that run tasks as processes; the folder has their state. The first task of the first job
-/// is lost.
-fn cluster(case: &Case) -> PathBuf {
-    let folder = case.path("cluster");
-    fs::create_dir(&folder).unwrap();
-    let programs = [
-        (
-            "sbatch",
-            r#"job=$(($(cat "$state/jobs" 2>/dev/null || echo 0) + 1)); echo "$job" >"$state/jobs"
-for option; do
-  case $option in
-    --array=*) last=${option#--array=0-} ;;
-    --mem=*) echo "${option#--mem=}" >>"$state/memory" ;;
-    --wrap=*) wrap=${option#--wrap=} ;;
-  esac
-done
-for task in $(seq 0 "$last"); do
-  [ "$job-$task" = 1-0 ] && continue
-  (SLURM_ARRAY_TASK_ID=$task sh -c "$wrap" </dev/null >/dev/null 2>&1 & echo "$task $!" >>"$state/tasks-$job")
-done
-echo "$job;cluster""#,
-        ),
-        (
-            "squeue",
-            r#"for option; do case $option in --jobs=*) job=${option#--jobs=} ;; esac; done
-[ -e "$state/tasks-$job" ] || exit 0
-while read -r task process; do kill -0 "$process" 2>/dev/null && echo "$task"; done <"$state/tasks-$job"
-exit 0"#,
-        ),
-        (
-            "scancel",
-            r#"while read -r task process; do kill "$process" 2>/dev/null; done <"$state/tasks-$2""#,
-        ),
-    ];
-    for (name, text) in programs {
-        let path = folder.join(name);
-        let state = folder.display();
-        fs::write(&path, format!("#!/bin/sh\nstate='{state}'\n{text}\n")).unwrap();
-        fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
-    }
-    folder
-}
-
-/// The command with these programs before all others.
-fn with_cluster(mut command: Command, cluster: &Path) -> Command {
-    let others = env::var_os("PATH").unwrap();
-    let paths = [cluster.to_owned()].into_iter();
-    let all = env::join_paths(paths.chain(env::split_paths(&others))).unwrap();
-    command.env("PATH", all);
-    command
-}
-
 #[test]
 fn tasks_of_a_cluster_give_the_products_of_one_machine_and_lost_tasks_are_repeated() {
     let case = campaign();
     let local = answer(&mut command(&case, "local"));
     let settings = "[executor]\nkind = \"slurm\"\nsites_per_task = 2\nmemory_mb = 300\n\n[kernels]";
     case.replace("scene/campaign.toml", "[kernels]", settings);
-    let cluster = cluster(&case);
-    let mut far = with_cluster(command(&case, "far"), &cluster);
+    let cluster = cluster(&case.path("cluster"));
+    let mut far = with_programs(command(&case, "far"), &cluster);
     let far = answer(&mut far);
     assert_eq!(far["counts"], local["counts"]);
     assert_eq!(processed(&far), processed(&local));
@@ -328,7 +276,7 @@ fn tasks_of_a_cluster_give_the_products_of_one_machine_and_lost_tasks_are_repeat
     let read = |name: &str| fs::read_to_string(cluster.join(name)).unwrap();
     assert_eq!(read("memory"), "300M\n600M\n");
     assert_eq!(read("jobs"), "2\n");
-    assert!(!case.path("far/.campaign-tasks").exists());
+    assert!(!case.path("far/.tasks").exists());
 
     // Without a cluster, the message states what to do.
     let mut alone = command(&case, "far");

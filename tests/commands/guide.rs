@@ -27,7 +27,7 @@ const WORDS: [(&str, usize); 3] = [
 ];
 
 /// Starts of commands that other tests run, with what runs them.
-const ELSEWHERE: [(&str, &str); 21] = [
+const ELSEWHERE: [(&str, &str); 22] = [
     ("gdalwarp -tps image.tif ", "tests/real/real_map.rs"),
     ("scripts/", "continuous integration"),
     (
@@ -47,6 +47,10 @@ const ELSEWHERE: [(&str, &str); 21] = [
     (
         "cp service-demo/updates/",
         "tests/service/service_run.rs, after the sites have run",
+    ),
+    (
+        "areograph pedr qa archive/pedr --kernels archive/kernels/archive.tm --out qa --executor slurm",
+        "tests/commands/pedr_qa_cluster.rs, with stand-ins for Slurm",
     ),
     ("areograph pedr sql", "tests/sql, with its feature"),
     ("areograph pedr cluster", "tests/cluster, with its feature"),

@@ -32,6 +32,7 @@ mod networks;
 mod pds_archive_index;
 mod pds_records;
 mod pedr_qa;
+mod pedr_qa_cluster;
 mod pedr_search;
 mod pedr_table;
 mod remote;

@@ -662,6 +662,7 @@ macro_rules! request {
                 source: String::new(),
             },
             allow_uncovered: false,
+            workers: None,
         };
     };
 }

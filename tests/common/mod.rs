@@ -25,6 +25,7 @@ pub(crate) mod pair;
 pub(crate) mod products_site;
 pub(crate) mod readers;
 pub(crate) mod search;
+pub(crate) mod slurm;
 #[cfg(all(target_os = "linux", target_arch = "x86_64"))]
 pub(crate) mod traced;
 

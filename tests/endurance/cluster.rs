@@ -17,8 +17,9 @@ use std::{
 };
 
 use common::{
-    checkout, long_test,
+    long_test,
     mission::{areograph, products, succeed},
+    slurm::virtual_cluster,
 };
 
 /// Pairs and single images of the campaign, and daemons that are killed while it runs.
@@ -32,14 +33,6 @@ const KILLED: [&str; 5] = [
 ];
 /// The campaign takes about a minute; a task that Slurm holds delays it by minutes.
 const LONGEST: Duration = Duration::from_mins(20);
-
-fn cluster(action: &str, folder: &Path) {
-    succeed(
-        Command::new(checkout().join("scripts/slurm"))
-            .arg(action)
-            .arg(folder),
-    );
-}
 
 /// Waits for a campaign to end.
 fn ended(campaign: &mut Child) -> Option<i32> {
@@ -80,16 +73,16 @@ fn killed_daemons_of_a_cluster_change_no_product() {
     let text = fs::read_to_string(&file).unwrap();
     let executor = "[executor]\nkind = \"slurm\"\nsites_per_task = 2\nmemory_mb = 500\n\n[kernels]";
     fs::write(&file, text.replace("[kernels]", executor)).unwrap();
-    cluster("start", &path("cluster"));
+    virtual_cluster("start", &path("cluster"));
     let mut campaign = run("far");
     for daemon in KILLED {
         thread::sleep(Duration::from_secs(4));
         let _ = Command::new("pkill").args(["-9", "-f", daemon]).status();
         thread::sleep(Duration::from_secs(4));
-        cluster("start", &path("cluster"));
+        virtual_cluster("start", &path("cluster"));
     }
     let code = ended(&mut campaign);
-    cluster("stop", &path("cluster"));
+    virtual_cluster("stop", &path("cluster"));
     assert!(matches!(code, Some(0 | 5)), "{code:?}");
     let [local, far] = ["local", "far"].map(|out| {
         let mut found = products(&path(out));

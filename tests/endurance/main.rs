@@ -2,6 +2,7 @@
 
 mod changes;
 mod cluster;
+mod cluster_archive;
 #[path = "../common/mod.rs"]
 mod common;
 mod killed;

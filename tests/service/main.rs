@@ -3,6 +3,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod service_check;
+mod service_cluster;
 mod service_commands;
 mod service_data;
 mod service_fetch;

@@ -18,7 +18,10 @@ use rusqlite::Connection;
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 
-use crate::common::mission::{areograph, succeed};
+use crate::common::{
+    mission::{areograph, succeed},
+    slurm::write_programs,
+};
 
 /// A configuration of `service init`, whose service listens at a free port.
 struct Service {
@@ -230,6 +233,27 @@ fn a_check_states_what_a_service_does() {
             assert_eq!(checked.status.code(), refused, "{what}");
         }
     }
+}
+
+#[test]
+fn a_machine_without_slurm_is_told() {
+    let service = Service::new();
+    service.change("kind = \"local\"", "kind = \"slurm\"");
+    let programs = service.folder.path().join("programs");
+    let subjects = || {
+        let mut check = areograph();
+        check
+            .args(["service", "check"])
+            .arg(service.path("areograph.toml"));
+        let checked = check.env("PATH", &programs).arg("--json").output().unwrap();
+        let answer: Value = serde_json::from_slice(&checked.stdout).unwrap();
+        assert_eq!(answer["starts"], true);
+        faults(&answer).len()
+    };
+    write_programs(&programs, &[]);
+    assert_eq!(subjects(), 2);
+    write_programs(&programs, &[("srun", "exit"), ("scancel", "exit")]);
+    assert_eq!(subjects(), 0);
 }
 
 #[test]

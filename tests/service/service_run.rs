@@ -28,15 +28,15 @@ use rustix::process::{Pid, Signal, kill_process};
 /// Longest time for anything, on a machine that does other things too.
 const PATIENCE: Duration = Duration::from_mins(4);
 /// The kernel that only `isidis` reads.
-const OWN: &str = "kernels/mgs_sc_isidis.bc";
+pub(crate) const OWN: &str = "kernels/mgs_sc_isidis.bc";
 
 /// A folder with a mission and a configuration that sees changes after a second.
-struct Mission {
+pub(crate) struct Mission {
     folder: tempfile::TempDir,
 }
 
 impl Mission {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let folder = tempfile::tempdir().unwrap();
         let mission = Self { folder };
         succeed(
@@ -76,15 +76,15 @@ impl Mission {
         mission
     }
 
-    fn path(&self, name: &str) -> PathBuf {
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 
-    fn file(&self, name: &str) -> PathBuf {
+    pub(crate) fn file(&self, name: &str) -> PathBuf {
         self.path("demo").join(name)
     }
 
-    fn serve(&self) -> Command {
+    pub(crate) fn serve(&self) -> Command {
         let mut command = areograph();
         command.arg("serve").arg(self.file("areograph.toml"));
         command.args(["--listen", "127.0.0.1:0"]);
@@ -92,18 +92,18 @@ impl Mission {
     }
 
     /// Starts the service; gives its address.
-    fn start(&self) -> (Service, String) {
+    pub(crate) fn start(&self) -> (Service, String) {
+        self.start_as(self.serve())
+    }
+
+    /// Starts the service by this command; gives its address.
+    pub(crate) fn start_as(&self, mut serve: Command) -> (Service, String) {
         let log = fs::File::options()
             .create(true)
             .append(true)
             .open(self.path("log"))
             .unwrap();
-        let mut child = self
-            .serve()
-            .stdout(Stdio::piped())
-            .stderr(log)
-            .spawn()
-            .unwrap();
+        let mut child = serve.stdout(Stdio::piped()).stderr(log).spawn().unwrap();
         let mut line = String::new();
         let mut output = BufReader::new(child.stdout.take().unwrap());
         output.read_line(&mut line).unwrap();
@@ -112,12 +112,12 @@ impl Mission {
         (Service(child), address)
     }
 
-    fn log(&self) -> String {
+    pub(crate) fn log(&self) -> String {
         fs::read_to_string(self.path("log")).unwrap_or_default()
     }
 
     /// The answer to a question to the database, first columns as text.
-    fn ask(&self, question: &str) -> Vec<String> {
+    pub(crate) fn ask(&self, question: &str) -> Vec<String> {
         let path = self.file("state/areograph.db");
         let database = Connection::open_with_flags(path, OpenFlags::SQLITE_OPEN_READ_ONLY).unwrap();
         database.busy_timeout(Duration::from_secs(5)).unwrap();
@@ -126,7 +126,7 @@ impl Mission {
         rows.map(Result::unwrap).collect()
     }
 
-    fn wait_for(&self, what: &str, is_so: impl Fn() -> bool) {
+    pub(crate) fn wait_for(&self, what: &str, is_so: impl Fn() -> bool) {
         let begun = Instant::now();
         while !is_so() {
             assert!(begun.elapsed() < PATIENCE, "{what}\n{}", self.log());
@@ -135,7 +135,7 @@ impl Mission {
     }
 
     /// Waits until so many jobs have ended, all well, and nothing is open.
-    fn wait_for_jobs(&self, count: usize) {
+    pub(crate) fn wait_for_jobs(&self, count: usize) {
         let open = "SELECT site FROM job WHERE ended_ms IS NULL";
         self.wait_for(&format!("{count} jobs"), || {
             self.states().len() >= count && self.ask(open).is_empty()
@@ -143,7 +143,7 @@ impl Mission {
         assert_eq!(self.states(), vec!["succeeded"; count], "{}", self.log());
     }
 
-    fn states(&self) -> Vec<String> {
+    pub(crate) fn states(&self) -> Vec<String> {
         self.ask("SELECT state FROM job ORDER BY id")
     }
 
@@ -180,7 +180,7 @@ impl Mission {
     }
 
     /// Makes sure that readers of a site get what a run from scratch gives.
-    fn assert_clean(&self, site: &str) {
+    pub(crate) fn assert_clean(&self, site: &str) {
         let (found, expected) = (self.current(site), self.clean(site));
         let files = |products: &std::collections::BTreeMap<PathBuf, Vec<u8>>| -> Vec<PathBuf> {
             products.keys().cloned().collect()
@@ -195,15 +195,15 @@ impl Mission {
 }
 
 /// A process that is ended with its test.
-struct Service(Child);
+pub(crate) struct Service(pub(crate) Child);
 
 impl Service {
-    fn signal(&self, signal: Signal) {
+    pub(crate) fn signal(&self, signal: Signal) {
         let pid = Pid::from_raw(i32::try_from(self.0.id()).unwrap()).unwrap();
         kill_process(pid, signal).unwrap();
     }
 
-    fn end(mut self) -> std::process::ExitStatus {
+    pub(crate) fn end(mut self) -> std::process::ExitStatus {
         self.signal(Signal::TERM);
         self.0.wait().unwrap()
     }
@@ -217,7 +217,7 @@ impl Drop for Service {
 }
 
 /// The same attitude under another name of the file inside: another content.
-fn other_version(kernel: &[u8], name: [u8; 4]) -> Vec<u8> {
+pub(crate) fn other_version(kernel: &[u8], name: [u8; 4]) -> Vec<u8> {
     let mut other = kernel.to_vec();
     // The internal file name of a DAF begins at byte 16.
     other[16..20].copy_from_slice(&name);
@@ -398,7 +398,7 @@ fn whatever_is_killed_each_job_ends_once() {
 }
 
 /// Lets jobs that wait go on at once.
-fn shorten_waiting(mission: &Mission) {
+pub(crate) fn shorten_waiting(mission: &Mission) {
     let database = Connection::open(mission.file("state/areograph.db")).unwrap();
     database.busy_timeout(Duration::from_secs(5)).unwrap();
     mission.wait_for("the end of an attempt", || {

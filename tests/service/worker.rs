@@ -60,9 +60,13 @@ struct Driven {
 
 impl Driven {
     fn start() -> Self {
+        Self::start_with(&["--parent", &std::process::id().to_string()])
+    }
+
+    fn start_with(arguments: &[&str]) -> Self {
         let mut child = areograph()
             .arg("worker")
-            .args(["--parent", &std::process::id().to_string()])
+            .args(arguments)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
@@ -941,4 +945,45 @@ fn a_killed_worker_is_told_by_its_signal_and_its_log_is_bounded() {
         "{}",
         log.len()
     );
+}
+
+/// A worker on a node whose connection was lost: its input neither ends nor says anything.
+#[test]
+fn a_worker_that_does_not_hear_the_service_for_its_lease_stops() {
+    let case = Case::new();
+    let folder = case.path("many");
+    fs::create_dir(&folder).unwrap();
+    for file in 0..2_000 {
+        fs::write(folder.join(file.to_string()), "").unwrap();
+    }
+    // 400,000 files take longer than the lease.
+    let list = What::List {
+        roots: vec![folder; 200],
+        into: case.path("list"),
+    };
+    let ended = |renewals: usize| {
+        let mut worker = Driven::start_with(&["--lease-s", "0.2"]);
+        worker.say(&text(&task(&case, list.clone())));
+        let mut input = worker.input.take().unwrap();
+        let service = std::thread::spawn(move || {
+            for _ in 0..renewals {
+                std::thread::sleep(Duration::from_millis(20));
+                // The worker may have ended.
+                let _ = input.write_all(b"{\"here\":true}\n");
+            }
+            input
+        });
+        let ended = worker.end();
+        drop(service.join());
+        ended
+    };
+    let (last, code) = ended(0);
+    let Some(Line::Failure(failure)) = last else {
+        panic!("{last:?}");
+    };
+    assert_eq!((failure.code, code), (130, Some(130)), "{}", failure.text);
+    assert!(!case.path("list").exists());
+    let (last, code) = ended(400);
+    assert!(matches!(last, Some(Line::Answer(_))), "{last:?}");
+    assert_eq!(code, Some(0));
 }

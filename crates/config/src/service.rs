@@ -12,6 +12,7 @@ use std::{
 use serde::Serialize;
 
 use super::{
+    campaign::ExecutorKind,
     declare::{Declare as _, Keys, Many, declare_table, key, of_the_file, table, tables},
     document::{Document, with_file},
     forms::{any_text, from_to, list, list_or_none, matching, text, whole_from_to, words},
@@ -50,6 +51,8 @@ declare_table! {
         changes: ChangesConfig = table(),
         /// The processes that run sites.
         workers: WorkersConfig = table(),
+        /// Where these processes run.
+        executor: ServiceExecutorConfig = table(),
         /// Retention of runs, events, logs and copies.
         retention: RetentionConfig = table(),
         /// Limits beyond which a site counts as stale.
@@ -170,6 +173,21 @@ declare_table! {
         /// Delay before the first retry after an input or output failure; each further retry doubles the delay, up to
         /// 15 minutes.
         retry_s: f64 = key(from_to(0.0, 900.0)).or(30.0),
+    }
+}
+
+declare_table! {
+    /// Where sites run. Plans, hashes and other short work remain on this machine. The nodes of a cluster share the folders of
+    /// inputs and products and the program, under the same paths. Slurm receives `workers.threads`, `workers.memory_mib` and
+    /// `workers.deadline_s`; `workers.count` remains the number of simultaneous runs, waiting in the queue of the cluster or running.
+    pub struct ServiceExecutorConfig {
+        /// Kind of executor.
+        kind: ExecutorKind = key(words([
+            ("local", ExecutorKind::Local, "on this machine"),
+            ("slurm", ExecutorKind::Slurm, "as jobs of a Slurm cluster, started with srun"),
+        ])).or(ExecutorKind::Local),
+        /// Further options of srun.
+        options: Vec<String> = key(list_or_none(text())).or(Vec::new()).unused(r#"["--partition=planetary"]"#),
     }
 }
 

@@ -1,7 +1,7 @@
 //! Everything that a service requires at its start, without starting one: nothing is created or changed.
 
 use std::{
-    fs,
+    env, fs,
     io::ErrorKind::{NotADirectory, NotFound},
     net::TcpListener,
     path::{Path, PathBuf},
@@ -15,16 +15,17 @@ use super::{
     engine::{
         disk::free_mib,
         folders::{Folder, folders},
-        hooks::program_of,
+        hooks::{program_in, program_of},
         schedule::next_night_ms,
     },
     lock::{LOCK, Owner, refuse_network},
     recover::{refuse_foreign, require_products},
     start::never_seen,
     words::counted,
+    worker::srun::{SCANCEL, SRUN},
 };
 use areograph_base::error::{Cause, IoError, Locate as _, Result};
-use areograph_config::ServiceConfig;
+use areograph_config::{ExecutorKind, ServiceConfig};
 
 /// One subject of a check.
 #[derive(Debug)]
@@ -53,6 +54,9 @@ enum Fault {
     #[error("the program {0} of a hook is not an executable file")]
     #[cause(Configuration: "correct hooks.command, or make the file executable")]
     NoProgram(String),
+    #[error("this machine has no program {0}: no run would start")]
+    #[cause(Configuration: "install Slurm on this machine, or set executor.kind = \"local\"")]
+    NoSlurm(&'static str),
 }
 
 /// Examines what the configuration names, in the order in which a service needs it.
@@ -117,6 +121,16 @@ pub fn check(config: &ServiceConfig, now_ms: i64) -> Vec<Finding> {
         let found = program_of(named).ok_or_else(|| Fault::NoProgram(named.to_owned()));
         let found = found.map(|path| format!("starts {}", path.display()));
         note("hook", &named, false, found.in_file(&config.file));
+    }
+    if config.executor.kind == ExecutorKind::Slurm {
+        for program in [SRUN, SCANCEL] {
+            // As workers are started.
+            let path = env::var_os("PATH").unwrap_or_default();
+            let found = program_in(program, env::split_paths(&path));
+            let found = found.ok_or(Fault::NoSlurm(program));
+            let found = found.map(|path| format!("starts {}", path.display()));
+            note("executor", &program, false, found.in_file(&config.file));
+        }
     }
     let address = config.http.listen;
     match running(state) {

@@ -204,6 +204,16 @@ impl StageCache {
         Ok(Output::known(label.to_owned(), value, provenance))
     }
 
+    /// The output for these inputs that another process has stored meanwhile, also when `forced`.
+    #[must_use]
+    pub fn load_of_others<T: DeserializeOwned>(&self, label: &str, inputs: &Inputs) -> Option<T> {
+        let (head, value) = read_intact(&self.path(label))?;
+        inputs
+            .changed_since(&head.inputs)
+            .is_empty()
+            .then_some(value)
+    }
+
     /// Discards the output of `stage`, so that it runs again.
     pub fn forget(&self, stage: &str) {
         // A missing file is already discarded.

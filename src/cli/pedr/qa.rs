@@ -1,9 +1,13 @@
 //! `areograph pedr qa`.
 
+mod executor;
+
 use std::{path::PathBuf, process::ExitCode};
 
 use clap::Args;
 
+use self::executor::ExecutorArguments;
+pub(in crate::cli) use self::executor::{TaskArguments, run_task};
 use crate::{
     altimetry::MolaClock,
     cli::{
@@ -13,7 +17,7 @@ use crate::{
     },
     config::usual_altimeter,
     error::Cause,
-    flow::{ArchiveRequest, Task, refuse_tables},
+    flow::{ArchiveRequest, ArchiveWorkers, Task, refuse_tables},
 };
 
 /// Checks every shot of an archive against kernels: measured range minus distance, profile by profile.
@@ -21,6 +25,8 @@ use crate::{
 /// Products go to --out: a row of statistics for every profile, shots of the worst ones, a page. A profile is the part of one
 /// revolution in one file. A check that was interrupted or killed resumes where it stopped, with the same result. The exit code
 /// is 5 if a profile exceeds a limit, a file could not be checked, or kernels do not cover a profile (unless --allow-uncovered).
+///
+/// With --executor slurm, tasks of a cluster check the files, and this command publishes the same products.
 ///
 /// Example: `areograph scene archive demo --days 5 && areograph pedr qa demo/pedr --kernels demo/kernels/archive.tm --out qa`
 #[derive(Debug, Args)]
@@ -38,12 +44,14 @@ pub(super) struct Arguments {
     /// Delay of the time tags; 0 leaves them unchanged. The default is the bias of MOLA's clock.
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, default_value_t = usual_altimeter().clock_bias_s)]
     clock_bias_s: f64,
-    /// Threads; the default is one per core.
+    /// Threads; the default is one per core, and one for each task of Slurm.
     #[arg(long)]
     threads: Option<std::num::NonZeroU16>,
     /// Do not report the archive as invalid if the kernels contain no position for some of its shots.
     #[arg(long)]
     allow_uncovered: bool,
+    #[command(flatten)]
+    executor: ExecutorArguments,
     #[command(flatten)]
     run: RunArguments,
 }
@@ -79,11 +87,16 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
             .num_threads(usize::from(threads.get()))
             .build_global();
     }
-    let clock = exist(&arguments.paths)
+    let prepared = exist(&arguments.paths)
         .and_then(|()| refuse_tables(&arguments.paths))
-        .and_then(|()| Ok(arguments.clock()?));
-    let clock = match clock {
-        Ok(clock) => clock,
+        .and_then(|()| {
+            let (clock, out) = (arguments.clock()?, &arguments.out);
+            let executor = &arguments.executor;
+            let tasks = executor.tasks(&arguments.kernels, &clock, out, arguments.threads)?;
+            Ok((clock, tasks))
+        });
+    let (clock, tasks) = match prepared {
+        Ok(prepared) => prepared,
         Err(failure) => return report(&failure),
     };
     let request = ArchiveRequest {
@@ -91,6 +104,7 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
         kernels: &arguments.kernels,
         clock,
         allow_uncovered: arguments.allow_uncovered,
+        workers: tasks.as_ref().map(|tasks| tasks as &dyn ArchiveWorkers),
     };
     let task = Task::Archive(&request);
     single::run(task, task.name(), &arguments.out, &arguments.run, |count| {

@@ -148,6 +148,4 @@ pub struct SiteTask {
     pub site_files: Vec<PathBuf>,
     /// Folder of the products.
     pub out: PathBuf,
-    /// File for the result, which appears when it is complete.
-    pub result: PathBuf,
 }

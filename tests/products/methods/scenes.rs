@@ -162,6 +162,7 @@ fn run_archive(folder: &Path) -> PathBuf {
             source: "the scene".to_owned(),
         },
         allow_uncovered: true,
+        workers: None,
     };
     run(folder, Task::Archive(&request))
 }

@@ -26,9 +26,11 @@ use crate::{
         parent::{Ended, How},
         process::ProcessIdentity,
         protocol::CancelWhy,
+        srun,
     },
 };
 use areograph_base::error::{Locate as _, Result};
+use areograph_config::ExecutorKind;
 
 /// Number of checks for the end of a worker, and the time between two checks.
 const LOOKS: u32 = 200;
@@ -58,6 +60,12 @@ fn adopt_jobs<W: Workers>(core: &Core<W>) -> Stored<()> {
                 .shared
                 .read(|connection| attempts::attempts(connection, job.id, 1))?;
             let newest = rows.into_iter().next();
+            if core.shared.config().executor.kind == ExecutorKind::Slurm
+                && let Some(newest) = &newest
+            {
+                let run = run_id(newest.started_utc.0, job.id, job.attempt);
+                srun::cancel(&srun::job_name(&run));
+            }
             if let Some(process) = newest.as_ref().and_then(|newest| newest.process.as_ref()) {
                 end(process);
             }

@@ -30,8 +30,11 @@ use crate::{
     worker::{
         parent::Heard,
         protocol::{CancelWhy, Line, What},
+        srun::Srun,
     },
 };
+use areograph_config::ExecutorKind;
+use areograph_store::hashes::HASHES;
 
 /// Time between two tries to record the end of an attempt while the database cannot be written.
 const NOTE_AGAIN: Duration = Duration::from_secs(1);
@@ -223,12 +226,18 @@ pub async fn follow<W: Workers>(core: Arc<Core<W>>, taken: Taken) -> Option<Run>
         "started"
     );
     let ended = {
-        let task = core.task(job.id, attempt.n, what);
+        let is_on_cluster = config.executor.kind == ExecutorKind::Slurm;
+        let mut task = core.task(job.id, attempt.n, what);
+        if is_on_cluster {
+            // Nodes do not have the folder of the state.
+            task.hashes_file = products.join(HASHES);
+        }
         let limits = core.limits(config.workers.deadline_s);
         let log = config.outputs.state.join(log_of(job.id, attempt.n));
+        let srun = is_on_cluster.then(|| Srun::of(&config, &attempt.run));
         let heard = |heard: Heard<'_>| hear(&core, &mut attempt, heard);
         core.workers
-            .work(task, limits, &log, cancel.clone(), heard)
+            .work(srun.as_ref(), task, limits, &log, cancel.clone(), heard)
             .await
     };
     let why = *cancel.borrow();

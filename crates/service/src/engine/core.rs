@@ -113,7 +113,10 @@ impl<W: Workers> Core<W> {
                 core: &core,
                 subject: &of_work,
             };
-            let ended = core.workers.work(task, limits, &log, cancel, |_| ()).await;
+            let ended = core
+                .workers
+                .work(None, task, limits, &log, cancel, |_| ())
+                .await;
             let _ = fs::remove_file(log);
             ended
         });

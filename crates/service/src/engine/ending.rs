@@ -23,10 +23,11 @@ use crate::{
     worker::{
         parent::{Ended, How},
         protocol::{Answer, CancelWhy, Failure, RunAnswer},
-        run_folder::remove,
+        run_folder::{bar, remove},
     },
 };
 use areograph_base::error::Error;
+use areograph_config::ExecutorKind;
 
 /// An attempt, and its last report.
 #[derive(Debug, Clone, Default)]
@@ -170,6 +171,12 @@ fn fruit<W: Workers>(core: &Core<W>, attempt: &Attempt, ended: &Ended) -> Stored
     };
     let products = core.shared.config().outputs.products.clone();
     let folder = runs(&products, &attempt.site).join(&attempt.run);
+    let is_on_cluster = core.shared.config().executor.kind == ExecutorKind::Slurm;
+    let has_begun = !matches!(ended.how, How::NotStarted(_));
+    if is_on_cluster && has_begun && ended.answer.is_none() {
+        // A worker on a lost node may still work: it publishes before this, or not at all.
+        bar(&folder).unwrap_or_else(|failure| tracing::warn!("{failure}"));
+    }
     // A worker that died after publishing has nevertheless published.
     if !folder.is_dir() {
         return Ok(match answer {

@@ -1,10 +1,6 @@
 //! Hooks: programs run without a shell, with JSON on their standard input, for at most 30 s.
 
-use std::{
-    path::{Path, PathBuf},
-    process::Stdio,
-    time::Duration,
-};
+use std::{path::PathBuf, process::Stdio, time::Duration};
 
 use rustix::fs::{Access, access};
 use rustix::process::{Pid, Signal, kill_process_group};
@@ -74,14 +70,23 @@ fn delay_ms(notification: &Notification) -> i64 {
 
 /// The executable file of a hook, searched for as at its start.
 pub(crate) fn program_of(program: &str) -> Option<PathBuf> {
-    let is_program = |path: &PathBuf| path.is_file() && access(path, Access::EXEC_OK).is_ok();
     if program.contains('/') {
         return Some(PathBuf::from(program)).filter(is_program);
     }
-    let places = PATH
-        .split(':')
-        .map(|folder| Path::new(folder).join(program));
-    places.into_iter().find(is_program)
+    program_in(program, PATH.split(':').map(PathBuf::from))
+}
+
+/// The program with this name in the first of some folders that has it.
+pub(crate) fn program_in(
+    program: &str,
+    folders: impl IntoIterator<Item = PathBuf>,
+) -> Option<PathBuf> {
+    let mut places = folders.into_iter().map(|folder| folder.join(program));
+    places.find(is_program)
+}
+
+fn is_program(path: &PathBuf) -> bool {
+    path.is_file() && access(path, Access::EXEC_OK).is_ok()
 }
 
 /// Runs a hook; returns the reason of a failure.

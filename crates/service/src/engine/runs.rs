@@ -4,6 +4,7 @@ use std::{
     fs,
     os::unix::fs::symlink,
     path::{Path, PathBuf},
+    time::Duration,
 };
 
 use chrono::DateTime;
@@ -213,15 +214,33 @@ pub fn tidy(site_folder: &Path) -> Result<Vec<PathBuf>> {
             published.push(path);
         } else if path.is_dir() {
             remove(&path)?;
+        } else if is_old_bar(&path) {
+            // One that remains does no harm.
+            let _ = fs::remove_file(&path);
         }
     }
     published.sort();
     Ok(published)
 }
 
+/// Whether a file took the name of a run ([`bar`](crate::worker::run_folder::bar)) so long ago that its worker has ended.
+fn is_old_bar(path: &Path) -> bool {
+    // The longest lease is a day.
+    const OLD: Duration = Duration::from_hours(48);
+    let metadata = fs::symlink_metadata(path);
+    metadata.is_ok_and(|of| {
+        let age = of
+            .modified()
+            .ok()
+            .and_then(|changed| changed.elapsed().ok());
+        of.is_file() && of.len() == 0 && age.is_some_and(|age| age > OLD)
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::worker::run_folder::bar;
 
     #[test]
     fn the_link_leads_to_one_whole_run_after_the_other() {
@@ -252,7 +271,19 @@ mod tests {
         let read_only = fs::Permissions::from_mode(0o555);
         fs::set_permissions(run("a").join("report"), read_only.clone()).unwrap();
         fs::set_permissions(run("a"), read_only).unwrap();
+        // Names taken from lost workers, one of them long ago.
+        for name in ["old", "new"] {
+            bar(&run(name)).unwrap();
+        }
+        let old = fs::File::options().write(true).open(run("old")).unwrap();
+        let now = std::time::SystemTime::now();
+        old.set_modified(now - Duration::from_hours(49)).unwrap();
         assert_eq!(tidy(folder.path()).unwrap(), [run("b")]);
         assert!(!run("a").exists() && !run("c.partial").exists());
+        assert!(!run("old").exists() && run("new").is_file());
+        // The folder of a worker that publishes later does not take the name; a run that exists keeps it.
+        assert!(fs::rename(run("b"), run("new")).is_err());
+        bar(&run("b")).unwrap();
+        assert!(run("b").join(MANIFEST).is_file());
     }
 }

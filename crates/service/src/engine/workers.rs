@@ -8,15 +8,17 @@ use std::{
 use tokio::sync::watch;
 
 use crate::worker::{
-    parent::{Ended, Heard, How, WorkerLimits, work},
+    parent::{Ended, Heard, How, WorkerLimits, work_at},
     protocol::{CancelWhy, Task},
+    srun::Srun,
 };
 
 /// Workers.
 pub trait Workers: Send + Sync + 'static {
-    /// Performs a task to its end, as [`work`] describes.
+    /// Performs a task to its end, as [`work_at`] describes.
     fn work(
         &self,
+        srun: Option<&Srun>,
         task: Task,
         limits: WorkerLimits,
         log: &Path,
@@ -35,13 +37,14 @@ pub struct Processes {
 impl Workers for Processes {
     async fn work(
         &self,
+        srun: Option<&Srun>,
         task: Task,
         limits: WorkerLimits,
         log: &Path,
         cancel: watch::Receiver<Option<CancelWhy>>,
         heard: impl FnMut(Heard<'_>) + Send,
     ) -> Ended {
-        work(&self.program, &task, &limits, log, cancel, heard).await
+        work_at(&self.program, srun, &task, &limits, log, cancel, heard).await
     }
 }
 

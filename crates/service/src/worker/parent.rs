@@ -1,7 +1,12 @@
 //! The service's side of one worker process: it starts the process, sends its task, reads its messages, ends it in time
 //! and waits for it.
 
-use std::{future::pending, path::Path, process::ExitStatus, time::Duration};
+use std::{
+    future::pending,
+    path::{Path, PathBuf},
+    process::ExitStatus,
+    time::Duration,
+};
 
 use rustix::process::Signal;
 use tokio::{
@@ -12,14 +17,19 @@ use tokio::{
     time::{Instant, sleep_until, timeout},
 };
 
+pub use super::ended::{Ended, How};
 use super::{
+    ended::{exited, exited_on_node, last_line, out_of_memory},
     fork::fork,
     lines::{Garbled, LineReader},
     log,
     process::{ProcessIdentity, signal_group},
-    protocol::{Answer, Cancel, CancelWhy, Failure, Line, PROTOCOL, Task},
+    protocol::{Answer, Cancel, CancelWhy, Failure, Here, Line, PROTOCOL, Task},
+    srun::{self, Srun},
 };
-use areograph_base::error::Kind;
+
+/// Renewals of a lease in its time.
+const RENEWALS: u32 = 5;
 
 /// Waiting times of the service's side, independent of the task.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -69,40 +79,6 @@ pub enum Heard<'a> {
     Line(&'a Line),
 }
 
-/// End of a worker.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum How {
-    /// By itself, with this code.
-    Exited(i32),
-    /// By a signal that the service did not send.
-    Signalled(i32),
-    /// Ended: no heartbeat for too long.
-    Silent,
-    /// Ended: the task took too long.
-    DeadlinePassed,
-    /// Ended: cancelled by the caller.
-    Cancelled,
-    /// Ended, or exited by itself, without a hello.
-    NoHello,
-    /// Ended: its version differs from the service's.
-    ForeignVersion(String),
-    /// Ended: it sent an invalid message.
-    Garbled(String),
-    /// It could not be started, for this reason.
-    NotStarted(String),
-}
-
-/// Result of a worker.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Ended {
-    /// Its end; an answer counts in any case.
-    pub how: How,
-    /// Its last line.
-    pub answer: Option<Result<Answer, Failure>>,
-    /// Largest reported memory, kibibytes.
-    pub rss_peak_kib: u64,
-}
-
 /// Has `task` done by its own process, and waits for its end.
 ///
 /// * `program` – areograph
@@ -117,10 +93,25 @@ pub async fn work(
     task: &Task,
     limits: &WorkerLimits,
     log: &Path,
+    cancel: watch::Receiver<Option<CancelWhy>>,
+    heard: impl FnMut(Heard<'_>) + Send,
+) -> Ended {
+    work_at(program, None, task, limits, log, cancel, heard).await
+}
+
+/// As [`work`], on a node of a cluster if `srun` states its resources.
+///
+/// The worker may wait in the queue of the cluster for any time: its limits apply from its hello on.
+pub async fn work_at(
+    program: &Path,
+    srun: Option<&Srun>,
+    task: &Task,
+    limits: &WorkerLimits,
+    log: &Path,
     mut cancel: watch::Receiver<Option<CancelWhy>>,
     mut heard: impl FnMut(Heard<'_>) + Send,
 ) -> Ended {
-    let mut worker = match Worker::start(program, task.memory_mib, limits, log).await {
+    let mut worker = match Worker::start(program, srun, task.memory_mib, limits, log).await {
         Ok(worker) => worker,
         Err(error) => {
             return Ended {
@@ -147,8 +138,7 @@ pub async fn work(
                 Err(garbled) => worker.garbled(&garbled),
             },
             why = asked(&mut cancel), if worker.ending.is_none() => {
-                worker.say(&Cancel { cancel: why }).await;
-                worker.end(How::Cancelled, Instant::now());
+                worker.cancel(why).await;
             }
             () = sleep_until(next) => worker.wake().await,
             status = &mut worker.exit => break status.ok().flatten(),
@@ -170,6 +160,8 @@ async fn asked(cancel: &mut watch::Receiver<Option<CancelWhy>>) -> CancelWhy {
 struct Worker {
     pid: u32,
     process: Option<ProcessIdentity>,
+    /// Of a worker on a node.
+    srun: Option<Srun>,
     times: Times,
     input: Option<ChildStdin>,
     lines: LineReader<BufReader<ChildStdout>>,
@@ -178,11 +170,15 @@ struct Worker {
     log: JoinHandle<std::io::Result<bool>>,
     memory_mib: u32,
     exit: JoinHandle<Option<ExitStatus>>,
+    log_path: PathBuf,
     hello: bool,
     hello_by: Instant,
     silence: Duration,
     heard_at: Instant,
+    longest: Duration,
     deadline: Instant,
+    /// When the lease of a worker on a node is renewed.
+    renew_at: Instant,
     ending: Option<Ending>,
     answer: Option<Result<Answer, Failure>>,
     rss_peak_kib: u64,
@@ -199,11 +195,12 @@ struct Ending {
 impl Worker {
     async fn start(
         program: &Path,
+        srun: Option<&Srun>,
         memory_mib: u32,
         limits: &WorkerLimits,
         log: &Path,
     ) -> std::io::Result<Self> {
-        let mut child = fork(program).await?;
+        let mut child = fork(program, srun).await?;
         let pid = child.id();
         let (input, output, errors) =
             (child.stdin.take(), child.stdout.take(), child.stderr.take());
@@ -213,24 +210,31 @@ impl Worker {
         let output = output.ok_or(std::io::ErrorKind::BrokenPipe)?;
         let errors = errors.ok_or(std::io::ErrorKind::BrokenPipe)?;
         let errors = ChildStderr::from_std(errors)?;
-        let (log, max_kib) = (log.to_owned(), limits.log_max_kib);
+        let (log_path, max_kib) = (log.to_owned(), limits.log_max_kib);
         let now = Instant::now();
         let after = |seconds: f64| Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);
         Ok(Self {
             pid,
             process,
+            srun: srun.cloned(),
             times: limits.times,
             input: input.map(ChildStdin::from_std).transpose()?,
             lines: LineReader::new(BufReader::new(ChildStdout::from_std(output)?)),
             speaks: true,
-            log: tokio::spawn(async move { log::copy(errors, &log, max_kib).await }),
+            log: {
+                let path = log_path.clone();
+                tokio::spawn(async move { log::copy(errors, &path, max_kib).await })
+            },
             memory_mib,
             exit,
+            log_path: log_path.clone(),
             hello: false,
             hello_by: now + limits.times.hello,
             silence: after(limits.silence_s),
             heard_at: now,
+            longest: after(limits.deadline_s),
             deadline: far(now, after(limits.deadline_s)),
+            renew_at: now,
             ending: None,
             answer: None,
             rss_peak_kib: 0,
@@ -248,11 +252,24 @@ impl Worker {
         let _ = timeout(self.times.drain, input.write_all(&line)).await;
     }
 
+    /// Asks the worker to stop; one that has not begun is ended at once.
+    async fn cancel(&mut self, why: CancelWhy) {
+        if self.srun.is_some() && !self.hello {
+            return self.end_at_once(How::Cancelled);
+        }
+        self.say(&Cancel { cancel: why }).await;
+        self.end(How::Cancelled, Instant::now());
+    }
+
     fn take(&mut self, line: &Line) {
         self.heard_at = Instant::now();
         match line {
             Line::Hello { v, version, .. } => {
                 self.hello = true;
+                if self.srun.is_some() {
+                    self.deadline = far(self.heard_at, self.longest);
+                    self.renew_at = self.heard_at;
+                }
                 if *v != PROTOCOL || version != env!("CARGO_PKG_VERSION") {
                     self.end_at_once(How::ForeignVersion(version.clone()));
                 }
@@ -296,10 +313,12 @@ impl Worker {
         }
         let silent = far(self.heard_at, self.silence);
         let next = silent.min(self.deadline);
-        if self.hello {
-            next
-        } else {
-            next.min(self.hello_by)
+        match (self.hello, self.srun.is_some()) {
+            (true, true) => next.min(self.renew_at),
+            (true, false) => next,
+            (false, false) => next.min(self.hello_by),
+            // It waits in the queue of the cluster.
+            (false, true) => far(self.heard_at, Duration::MAX),
         }
     }
 
@@ -313,6 +332,8 @@ impl Worker {
             let signal = [Signal::TERM, Signal::KILL][ending.sent.min(1)];
             signal_group(self.pid, signal);
             ending.sent += 1;
+        } else if self.srun.is_some() && !self.hello {
+            // It waits in the queue of the cluster.
         } else if !self.hello && now >= self.hello_by {
             self.end_at_once(How::NoHello);
         } else if now >= self.deadline {
@@ -323,6 +344,9 @@ impl Worker {
             self.end(How::DeadlinePassed, now);
         } else if now >= far(self.heard_at, self.silence) {
             self.end_at_once(How::Silent);
+        } else if self.srun.is_some() && now >= self.renew_at {
+            self.renew_at = far(now, self.silence / RENEWALS);
+            self.say(&Here { here: true }).await;
         }
     }
 
@@ -356,9 +380,18 @@ impl Worker {
         }
         // Processes started by the worker end with it.
         signal_group(self.pid, Signal::KILL);
+        if let Some(srun) = &self.srun
+            && status.is_none_or(|status| status.code().is_none())
+        {
+            srun::cancel(&srun.job_name);
+        }
         let answered = matches!(self.answer, Some(Ok(_)));
         let how = match self.ending {
             Some(ending) if !answered => ending.how,
+            _ if self.srun.is_some() => match exited_on_node(status) {
+                How::Exited(_) if !self.hello => How::NotStarted(last_line(&self.log_path).await),
+                how => how,
+            },
             _ if !self.hello => How::NoHello,
             _ => exited(status),
         };
@@ -371,29 +404,6 @@ impl Worker {
             rss_peak_kib: self.rss_peak_kib,
         }
     }
-}
-
-/// The failure of a worker that aborted because its limit refused memory.
-fn out_of_memory(memory_mib: u32) -> Failure {
-    Failure {
-        code: Kind::Configuration.exit_code(),
-        busy: false,
-        site: None,
-        stage: None,
-        file: None,
-        text: format!(
-            "the worker needs more memory than workers.memory_mib = {memory_mib} allows; raise this limit, and restart or reload \
-             the service"
-        ),
-    }
-}
-
-fn exited(status: Option<ExitStatus>) -> How {
-    use std::os::unix::process::ExitStatusExt as _;
-    let code = status.and_then(|status| status.code()).map(How::Exited);
-    let signal = status.and_then(|status| status.signal());
-    code.or(signal.map(How::Signalled))
-        .unwrap_or(How::Exited(-1))
 }
 
 /// A later instant, or the latest useful one.

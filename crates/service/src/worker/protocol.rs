@@ -1,6 +1,6 @@
 //! The lines between the service and a worker: one JSON object each, at most [`LINE_MAX`] bytes.
 //!
-//! The service writes one [`Task`], later perhaps one [`Cancel`]; the end of its output means that the service has
+//! The service writes one [`Task`], then [`Here`] at intervals if the worker has a lease, and perhaps one [`Cancel`]; the end of its output means that the service has
 //! ended, and the worker stops. The worker writes [`Line`]s, `hello` first and `answer` or `failure` last; one that is
 //! too long for a line is sent in pieces. Unknown fields are ignored.
 
@@ -131,6 +131,13 @@ pub enum CancelWhy {
 pub struct Cancel {
     /// The reason.
     pub cancel: CancelWhy,
+}
+
+/// The line that renews the lease of a worker on another computer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Here {
+    /// Whether the service is there.
+    pub here: bool,
 }
 
 /// A message of a worker.

@@ -6,6 +6,7 @@
 use std::{
     collections::BTreeSet,
     fs::{self, File, Permissions},
+    io::ErrorKind,
     os::unix::fs::PermissionsExt as _,
     path::{Path, PathBuf},
 };
@@ -112,6 +113,21 @@ pub fn keep(
         .in_file(folder)?;
     atomic::sync_folder(runs);
     Ok((blake3, true))
+}
+
+/// Takes the name of a run that does not exist, so that a worker on a node that was lost, and may still work, cannot publish it
+/// after its attempt has ended. A run that exists remains.
+///
+/// # Errors
+/// A disk error.
+pub fn bar(run_folder: &Path) -> Result<()> {
+    // A folder cannot be renamed to the name of a file.
+    match File::create_new(run_folder) {
+        Err(error) if error.kind() != ErrorKind::AlreadyExists => {
+            Err(IoError::on("create")(error)).in_file(run_folder)
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Removes remainders of attempts that were killed; the site's lock is held.

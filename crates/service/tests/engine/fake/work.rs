@@ -18,6 +18,7 @@ use areograph_service::{
             PlannedStage, Probed, RunAnswer, Task, What,
         },
         run_folder::{RUN_RECORD, RunRecord, newest},
+        srun::Srun,
     },
 };
 use areograph_store::manifest::{
@@ -71,6 +72,7 @@ fn failed(code: u8, text: &str) -> Ended {
 impl Workers for Played {
     async fn work(
         &self,
+        _srun: Option<&Srun>,
         task: Task,
         _limits: WorkerLimits,
         _log: &Path,
