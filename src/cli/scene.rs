@@ -9,9 +9,9 @@ use crate::{
     error::Error,
     scene::{
         ArchiveOptions, CampaignOptions, Coder, OrbitsScene, Roughness, SceneErrors, SceneOptions,
-        write_archive, write_calibration_loop_scene, write_calibration_orbits,
-        write_calibration_scene, write_campaign, write_plane_scene, write_scene, write_scene_along,
-        write_scene_with_images, write_terrain_model_scene,
+        write_archive, write_calibration_images, write_calibration_loop_scene,
+        write_calibration_orbits, write_calibration_scene, write_campaign, write_plane_scene,
+        write_scene, write_scene_along, write_scene_with_images, write_terrain_model_scene,
     },
     units::SECONDS_PER_DAY,
     watch::Watch,
@@ -164,9 +164,13 @@ struct CalibrationArguments {
     #[arg(long)]
     images: bool,
     /// This number of orbits, 2 to 50, a quarter of a year apart, with a calibration file each: input of `areograph calibrate series`.
-    /// Orbits have errors of 1000 m and 0.025 degrees, profiles of the laser have shared errors.
-    #[arg(long, value_name = "COUNT", conflicts_with = "images", value_parser = clap::value_parser!(u32).range(2..=50))]
+    /// Profiles of the laser have shared errors. With --images, images also have shadows,
+    /// unequal light and loss by compression, and the first calibration is validated in the other orbits.
+    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(2..=50))]
     orbits: Option<u32>,
+    /// Errors of orbits and attitudes over those of Li et al. 2023, Table 2 (1000 m, 0.01 m per line, 0.025 degrees), 0 to 10.
+    #[arg(long, value_name = "FACTOR", requires = "orbits", default_value_t = 1.0, value_parser = orbit_errors)]
+    orbit_errors: f64,
     /// Ageing of the camera over the orbits: roll of the second line relative to the first, pixels per year, -100 to 100; scale
     /// and yaw change by half of this.
     #[arg(long, value_name = "PX_PER_YEAR", requires = "orbits", default_value_t = 0.5, allow_negative_numbers = true, value_parser = ageing)]
@@ -240,6 +244,14 @@ fn ageing(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A factor of orbit errors as typed.
+fn orbit_errors(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(factor) if (0.0..=10.0).contains(&factor) => Ok(factor),
+        _ => Err("expected a number from 0 to 10".to_owned()),
+    }
+}
+
 /// An offset as typed.
 fn clock_offset(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
@@ -298,9 +310,16 @@ fn calibration(arguments: &CalibrationArguments) -> Result<(), Error> {
             let scene = OrbitsScene {
                 seed: *seed,
                 orbits,
+                orbit_errors: arguments.orbit_errors,
                 ageing_px_per_year: arguments.ageing_px,
             };
-            working(|_| write_calibration_orbits(directory, &scene))?
+            working(|watch| {
+                if arguments.images {
+                    write_calibration_images(directory, &scene, None, watch)
+                } else {
+                    write_calibration_orbits(directory, &scene)
+                }
+            })?
         }
         None if arguments.images => {
             working(|watch| write_calibration_loop_scene(directory, *seed, watch))?

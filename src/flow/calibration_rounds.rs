@@ -63,16 +63,23 @@ pub(super) fn rounds<D: Driver>(flow: &mut D, config: &CalibrationConfig) -> Flo
         rounds: Vec::new(),
         rounds_max: config.laser.rounds_max,
         cell_m: config.laser.cell_m.unwrap_or_default(),
+        laser_sigma_m: config.control.sigma_horizontal_m,
     };
     let (_, mut before) = lines.aligned(flow, LinesRound::Wide, None)?;
     let mut first: Option<Output<ModelMatch>> = None;
+    let mut units: Option<(u32, Output<ModelMatch>)> = None;
     for number in 1.. {
-        let round = lines.round(flow, number, &before, first.as_ref())?;
+        let earlier = units.as_ref().map(|(_, control)| control);
+        let round = lines.round(flow, number, &before, earlier)?;
         if round.is_pending() {
             before = round.calibrated;
             break;
         }
-        rounds.rounds.push(round.figures(number)?);
+        let (units_of, _) = units.get_or_insert_with(|| (number, round.control.clone()));
+        rounds.rounds.push(round.figures(number, *units_of)?);
+        if rounds.selects_again() {
+            units = None;
+        }
         let is_last = rounds.is_converged() || number >= rounds.rounds_max;
         let first = first.get_or_insert_with(|| round.control.clone());
         if is_last {
@@ -180,7 +187,7 @@ impl<'a> Lines<'a> {
         flow: &mut D,
         number: u32,
         before: &Output<Calibration>,
-        first: Option<&Output<ModelMatch>>,
+        earlier: Option<&Output<ModelMatch>>,
     ) -> Flow<Round> {
         let (config, survey) = (self.config, &self.survey);
         let round = LinesRound::Number(number);
@@ -201,7 +208,7 @@ impl<'a> Lines<'a> {
             laser: LaserKeys(&config.laser),
             held_back_every: &config.control.held_back_every,
             pedr: InOrder(&self.pedr),
-            first,
+            earlier,
         })?;
         let calibrated = flow.stage(&CalibrateLines {
             round,
@@ -237,9 +244,10 @@ impl Round {
         outputs.iter().any(Option::is_none)
     }
 
-    fn figures(&self, number: u32) -> Result<CalibrationRound> {
+    fn figures(&self, number: u32, units_of: u32) -> Result<CalibrationRound> {
         Ok(CalibrationRound::of(
             number,
+            units_of,
             self.aligned.value()?,
             self.surface.value()?.account.filled_share(),
             &self.control.value()?.found,

@@ -4,7 +4,7 @@
 use std::{fmt::Write as _, fs, path::Path, process::Command, sync::atomic::AtomicBool};
 
 use areograph::{
-    scene::{LineScene, write_line_scene},
+    scene::{LineErrors, LineScene, write_line_scene},
     watch::Watch,
 };
 
@@ -74,7 +74,7 @@ fn write(folder: &Path, seed: u64, images: &[(&str, &str, u32)], surface: &str) 
         let scene = LineScene {
             seed,
             size: [*lines, 240],
-            is_wrong: false,
+            errors: LineErrors::Exact,
         };
         let stop = AtomicBool::new(false);
         write_line_scene(&folder.join(name), &scene, Watch::from(&stop)).unwrap();

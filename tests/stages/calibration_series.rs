@@ -43,6 +43,7 @@ impl Calibrated {
         let scene = OrbitsScene {
             seed,
             orbits,
+            orbit_errors: 1.0,
             ageing_px_per_year,
         };
         write_calibration_orbits(&folder.path().join("scene"), &scene).unwrap();

@@ -5,6 +5,7 @@ mod adjusted_kernels;
 mod adjusted_points;
 mod attitude_edges;
 mod calibrate;
+mod calibration_images;
 mod calibration_loop;
 mod calibration_series;
 #[path = "../common/mod.rs"]

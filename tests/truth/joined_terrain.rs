@@ -8,7 +8,7 @@
 
 use std::{fs, fs::File, path::Path};
 
-use areograph::scene::LineScene;
+use areograph::scene::{LineErrors, LineScene};
 use tiff::decoder::{Decoder, DecodingResult};
 
 use crate::{
@@ -83,7 +83,7 @@ fn heights_of_all_pairs_are_within_what_they_state() {
     let scene = LineScene {
         seed: SEED,
         size: [400, 240],
-        is_wrong: false,
+        errors: LineErrors::Exact,
     };
     let out = folder.path().join("out");
     let mut run = areograph();

@@ -24,9 +24,10 @@ pub(super) fn rounds(
     let words = format!(
         "A round measures tie points, makes the lines consistent with them, and matches a terrain model with cells of {} m to \
          the laser. Tie points and laser points then calibrate the cameras from which the next round starts. Rounds end when \
-         half of the units are shifted by less than half a cell and control residuals change by less than 2 %, or after {} \
-         rounds.",
+         half of the units are shifted by less than {} cells (half a cell, and the errors of the laser) and control residuals change by less \
+         than 2 %, or after {} rounds.",
         label(of.cell_m, 0),
+        label(of.shift_limit_cells(), 2),
         of.rounds_max
     );
     Ok(html! {
@@ -49,22 +50,12 @@ const UNITS_SHOWN: usize = 12;
 
 /// Concordance of terrain models and laser before and after the calibration, unit by unit.
 fn concordances(of: &CalibrationModel<'_>) -> Markup {
-    let kept = of.last.units.iter().filter(|unit| unit.is_kept());
-    let both: Vec<[f64; 3]> = kept
-        .filter_map(|unit| {
-            let first = of
-                .first
-                .units
-                .iter()
-                .find(|first| first.unit == unit.unit)?;
-            let [before, after] = [first.concordance[0]?, unit.concordance[0]?];
-            Some([unit.unit as f64, before, after])
-        })
-        .collect();
+    let both = of.last.concordances_after(of.first);
     if both.is_empty() {
         return Markup::default();
     }
-    let median_of = |at: usize| median(&mut both.iter().map(|row| row[at]).collect::<Vec<f64>>());
+    let median_of =
+        |at: usize| median(&mut both.iter().map(|(_, of)| of[at]).collect::<Vec<f64>>());
     let mut table = Table::new(
         "Concordance of terrain model and laser heights at withheld shots, without any shift",
         &[
@@ -78,12 +69,12 @@ fn concordances(of: &CalibrationModel<'_>) -> Markup {
         let [before, after] = numbers;
         table.row(true, [name.into(), before, after]);
     };
-    for [unit, before, after] in both.iter().take(UNITS_SHOWN) {
-        row(label(*unit, 0), [*before, *after]);
+    for (unit, of) in both.iter().take(UNITS_SHOWN) {
+        row(unit.to_string(), *of);
     }
     row(
         "median of all kept units".to_owned(),
-        [median_of(1), median_of(2)],
+        [median_of(0), median_of(1)],
     );
     let words = "Every fourth shot of a unit takes no part in the search for its shift. The concordance (Li et al. 2023, eq. 18 and \
                  Table 4) is 1 only for equal heights. The model of the first round contains the errors of orbit and mounting; \

@@ -1,12 +1,16 @@
 //! Three lines of a camera in one orbit with their pixels, laser passes over the ground in two directions, and true
 //! values: the input of `areograph calibrate` from pixels.
 
-use std::{collections::BTreeMap, path::Path};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
 
 use serde::Serialize;
 
 use super::{
     calibration::drawn_offset,
+    calibration_orbits::{OrbitsScene, drawn_attitude_deg, drawn_orbit, years_after},
     error_sources::{Relief, Roughness},
     files::{Draft, put},
     line_images::LineImages,
@@ -30,16 +34,19 @@ const README: &str = "Three lines of a camera in one orbit: support data (isd/),
 const LONGITUDE_DEG: f64 = -63.13;
 const LATITUDE_DEG: f64 = -33.0;
 /// Lines and samples of an image: 65 by 22 km.
-const SIZE: [u32; 2] = [2_400, 800];
+pub(super) const SIZE: [u32; 2] = [2_400, 800];
 /// Laser passes over that ground: those of one direction are 1.4 km apart; both together are as dense as the 126 over a
 /// whole swath in Li et al. 2023.
-const PASSES: Passes = Passes {
-    longitude_rad: LONGITUDE_DEG * RADIANS_PER_DEGREE,
-    latitude_rad: LATITUDE_DEG * RADIANS_PER_DEGREE,
-    of_direction: 17,
-    half_width_m: 12_000.0,
-    half_s: 12.0,
-};
+const OF_DIRECTION: u32 = 17;
+const HALF_WIDTH_M: f64 = 12_000.0;
+const HALF_S: f64 = 12.0;
+/// Orbits between the passes over the ground of one orbit and those of the next.
+const ORBITS_APART: u32 = 100;
+/// Standard deviations of the position of a pass, metres: towards the east and the north each, and radially.
+///
+/// # Source
+/// 100 m in the horizontal and 1 m radially: Neumann et al. 2001, as Shan et al. 2005 cite them.
+const PASS_SIGMA_M: [f64; 2] = [70.0, 1.0];
 /// Points along and across the ground with true image coordinates, and the share of the swath that they cover.
 const CHECKED: [u32; 2] = [19, 7];
 const CHECKED_SHARE: [f64; 2] = [0.84, 0.9];
@@ -51,15 +58,38 @@ pub struct LineScene {
     pub seed: u64,
     /// Lines and samples of an image.
     pub size: [u32; 2],
-    /// Whether support data have errors of the mounting and the orbit; otherwise they are exact.
-    pub is_wrong: bool,
+    /// Errors of support data, images and laser passes.
+    pub errors: LineErrors,
+}
+
+/// Errors of a scene of three lines.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum LineErrors {
+    /// Support data are exact; images have noise.
+    Exact,
+    /// Mounting and orbit are wrong by certain amounts; images have noise.
+    Certain,
+    /// Errors of one of several orbits, of its images and of its laser passes.
+    Drawn(OneOfOrbits),
+}
+
+/// One of several orbits of an ageing camera.
+///
+/// Every laser pass has an error in its position. Images have shadows, light that depends on the look direction and moves with the Sun,
+/// another response in every line, and loss by compression.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OneOfOrbits {
+    /// Number of the orbit, from 0.
+    pub number: u32,
+    /// All orbits; their seed is that of the scene.
+    pub of: OrbitsScene,
 }
 
 impl LineScene {
     /// The ground of the scene.
     #[must_use]
     pub fn ground(&self) -> TrueGround {
-        let middle = orbit(self).ground(0.5, 0.0).normalize();
+        let middle = self.orbit().ground(0.5, 0.0).normalize();
         let relief = Relief::SelfAffine(Roughness::Rough);
         TrueGround(Terrain::new(self.seed, &[middle], relief))
     }
@@ -70,7 +100,7 @@ impl LineScene {
         Self {
             seed,
             size: SIZE,
-            is_wrong: true,
+            errors: LineErrors::Certain,
         }
     }
 
@@ -82,68 +112,80 @@ impl LineScene {
     )]
     fn passes(&self) -> Passes {
         let [along, across] = [0, 1].map(|axis| f64::from(self.size[axis]) / f64::from(SIZE[axis]));
+        let orbit = self.orbit();
+        let (first_orbit, shift_sigma_m) = match self.errors {
+            LineErrors::Drawn(of) => (1 + ORBITS_APART * of.number, PASS_SIGMA_M),
+            LineErrors::Exact | LineErrors::Certain => (1, [0.0; 2]),
+        };
         Passes {
-            of_direction: (f64::from(PASSES.of_direction) * across).ceil() as u32,
-            half_width_m: PASSES.half_width_m * across,
-            half_s: PASSES.half_s * along,
-            ..PASSES
+            longitude_rad: orbit.longitude_deg * RADIANS_PER_DEGREE,
+            latitude_rad: orbit.latitude_deg * RADIANS_PER_DEGREE,
+            of_direction: (f64::from(OF_DIRECTION) * across).ceil() as u32,
+            half_width_m: HALF_WIDTH_M * across,
+            half_s: HALF_S * along,
+            first_orbit,
+            shift_sigma_m,
+        }
+    }
+
+    /// Share of the errors of the mounting that the scene has.
+    const fn wrong(&self) -> f64 {
+        match self.errors {
+            LineErrors::Exact => 0.0,
+            LineErrors::Certain | LineErrors::Drawn(_) => 1.0,
+        }
+    }
+
+    /// The true lines: drawn offsets, the errors of the paper's synthetic case, and a third line between them.
+    fn lines(&self) -> [StereoLine; 3] {
+        let wrong = self.wrong();
+        let half = 0.5 * f64::from(self.size[1]);
+        let line = |name, pitch_deg, angles_deg: [f64; 3], sense: f64| {
+            let sense = wrong * sense;
+            let [m1, n1, n2] = [2e-7 * half, 1e-7 * half, 1e-11 * half * half];
+            let mut line = StereoLine {
+                name,
+                pitch_deg,
+                offset: drawn_offset(self.seed, name, angles_deg.map(|angle| wrong * angle)),
+                errors: [sense * m1, sense * n1, sense * n2],
+            };
+            if let LineErrors::Drawn(of) = self.errors {
+                let roll_px = of.of.ageing_px_per_year * years_after(of.number);
+                line.age(roll_px * StereoLine::pixel(), half);
+                line.turn(drawn_attitude_deg(&of.of, of.number));
+            }
+            line
+        };
+        [
+            line("s1", 18.9, [0.055, 0.020, 0.030], 1.0),
+            line("nd", 0.0, [0.010, -0.012, 0.015], 0.5),
+            line("s2", -18.9, [-0.050, -0.015, -0.020], -1.0),
+        ]
+    }
+
+    fn orbit(&self) -> Orbit {
+        let wrong = self.wrong();
+        if let LineErrors::Drawn(of) = self.errors {
+            return drawn_orbit(&of.of, of.number, self.size, true);
+        }
+        Orbit {
+            name: "i864".to_owned(),
+            start_et_s: 596_764_800.0,
+            longitude_deg: LONGITUDE_DEG,
+            latitude_deg: LATITUDE_DEG,
+            size: self.size,
+            is_steered: true,
+            error: OrbitError {
+                bias_m: [350.0, 500.0, -420.0].map(|of| wrong * of),
+                drift_m_per_line: [0.006, -0.006, 0.006].map(|of| wrong * of),
+            },
         }
     }
 }
 
-/// The true lines: drawn offsets, the errors of the paper's synthetic case, and a third line between them.
-fn lines(scene: &LineScene) -> [StereoLine; 3] {
-    let wrong = if scene.is_wrong { 1.0 } else { 0.0 };
-    let offset = |line, angles_deg: [f64; 3]| {
-        drawn_offset(scene.seed, line, angles_deg.map(|angle| wrong * angle))
-    };
-    let half = 0.5 * f64::from(scene.size[1]);
-    let errors = |sense: f64| {
-        let sense = wrong * sense;
-        let [m1, n1, n2] = [2e-7 * half, 1e-7 * half, 1e-11 * half * half];
-        [sense * m1, sense * n1, sense * n2]
-    };
-    [
-        StereoLine {
-            name: "s1",
-            pitch_deg: 18.9,
-            offset: offset("s1", [0.055, 0.020, 0.030]),
-            errors: errors(1.0),
-        },
-        StereoLine {
-            name: "nd",
-            pitch_deg: 0.0,
-            offset: offset("nd", [0.010, -0.012, 0.015]),
-            errors: errors(0.5),
-        },
-        StereoLine {
-            name: "s2",
-            pitch_deg: -18.9,
-            offset: offset("s2", [-0.050, -0.015, -0.020]),
-            errors: errors(-1.0),
-        },
-    ]
-}
-
-fn orbit(scene: &LineScene) -> Orbit {
-    let wrong = if scene.is_wrong { 1.0 } else { 0.0 };
-    Orbit {
-        name: "i864".to_owned(),
-        start_et_s: 596_764_800.0,
-        longitude_deg: LONGITUDE_DEG,
-        latitude_deg: LATITUDE_DEG,
-        size: scene.size,
-        is_steered: true,
-        error: OrbitError {
-            bias_m: [350.0, 500.0, -420.0].map(|of| wrong * of),
-            drift_m_per_line: [0.006, -0.006, 0.006].map(|of| wrong * of),
-        },
-    }
-}
-
-/// The file of true values.
+/// True values of an orbit.
 #[derive(Serialize)]
-struct Truth {
+pub(super) struct Truth {
     made_by: &'static str,
     synthetic: &'static str,
     seed: u64,
@@ -184,52 +226,80 @@ pub fn write_calibration_loop_scene(
 /// # Errors
 /// Those of [`write_calibration_loop_scene`].
 pub fn write_line_scene(directory: &Path, scene: &LineScene, watch: Watch<'_>) -> Result<String> {
-    let seed = scene.seed;
     let draft = Draft::begin(directory, README)?;
-    let [isd, images, pedr] = ["isd", "images", "pedr"].map(|folder| draft.folder(folder));
-    let (isd, images, pedr) = (isd?, images?, pedr?);
-    let (lines, orbit, passes) = (lines(scene), orbit(scene), scene.passes());
-    let TrueGround(terrain) = scene.ground();
-    let rendered = LineImages {
-        orbit: &orbit,
-        terrain: &terrain,
-        seed,
-    };
-    watch.announce(lines.len() * orbit.size[0] as usize);
-    for line in &lines {
-        let path = isd.join(format!("{}.json", line.name));
-        put(&path, &orbit.support_data(line)).in_file(&path)?;
-        let path = images.join(format!("{}.tif", line.name));
-        rendered.write(&path, line, watch).in_file(&path)?;
-    }
-    passes.write(&pedr, &terrain, seed)?;
-    let truth = Truth {
-        made_by: "areograph scene",
-        synthetic: "not from mission data",
-        seed,
-        angles_deg: (lines.iter())
-            .map(|line| {
-                let of = &line.offset;
-                let angles = [of.phi_rad, of.omega_rad, of.kappa_rad];
-                (line.name, angles.map(f64::to_degrees))
-            })
-            .collect(),
-        orbit_bias_m: orbit.error.bias_m,
-        orbit_drift_m_per_line: orbit.error.drift_m_per_line,
-        checked: checked(&orbit, &lines, &terrain),
-    };
-    let truth = serde_json::to_string_pretty(&truth).unwrap_or_default() + "\n";
-    for (name, text) in [("truth.json", &*truth), ("calibration.toml", CALIBRATION)] {
-        let path = draft.root().join(name);
-        put(&path, text).in_file(&path)?;
-    }
+    let folders = Folders::of(&draft)?;
+    watch.announce(LINES * scene.size[0] as usize);
+    let truth = folders.write(scene, "", watch)?;
+    put_truth(&draft, &truth)?;
+    let path = draft.root().join("calibration.toml");
+    let calibration = [NAME, &CAMERAS.replace("PREFIX", ""), CONTROL].concat();
+    put(&path, &calibration).in_file(&path)?;
     draft.finish()?;
     Ok(format!(
         "{}: three lines with pixels, {} laser passes over the same ground; next: areograph calibrate {}",
         directory.display(),
-        passes.count(),
+        scene.passes().count(),
         directory.join("calibration.toml").display()
     ))
+}
+
+/// Folders of a scene.
+pub(super) struct Folders {
+    isd: PathBuf,
+    images: PathBuf,
+    pedr: PathBuf,
+}
+
+impl Folders {
+    pub(super) fn of(draft: &Draft) -> Result<Self> {
+        let [isd, images, pedr] = ["isd", "images", "pedr"].map(|folder| draft.folder(folder));
+        Ok(Self {
+            isd: isd?,
+            images: images?,
+            pedr: pedr?,
+        })
+    }
+
+    /// Writes the files of an orbit, whose names begin with `prefix`, and returns its true values.
+    pub(super) fn write(&self, scene: &LineScene, prefix: &str, watch: Watch<'_>) -> Result<Truth> {
+        let (seed, lines, orbit) = (scene.seed, scene.lines(), scene.orbit());
+        let TrueGround(terrain) = scene.ground();
+        let rendered = LineImages {
+            orbit: &orbit,
+            terrain: &terrain,
+            seed,
+            is_fair: matches!(scene.errors, LineErrors::Drawn(_)),
+        };
+        for line in &lines {
+            let path = self.isd.join(format!("{prefix}{}.json", line.name));
+            put(&path, &orbit.support_data(line)).in_file(&path)?;
+            let path = self.images.join(format!("{prefix}{}.tif", line.name));
+            rendered.write(&path, line, watch).in_file(&path)?;
+        }
+        scene.passes().write(&self.pedr, &terrain, seed)?;
+        Ok(Truth {
+            made_by: "areograph scene",
+            synthetic: "not from mission data",
+            seed,
+            angles_deg: (lines.iter())
+                .map(|line| {
+                    let of = &line.offset;
+                    let angles = [of.phi_rad, of.omega_rad, of.kappa_rad];
+                    (line.name, angles.map(f64::to_degrees))
+                })
+                .collect(),
+            orbit_bias_m: orbit.error.bias_m,
+            orbit_drift_m_per_line: orbit.error.drift_m_per_line,
+            checked: checked(&orbit, &lines, &terrain),
+        })
+    }
+}
+
+pub(super) fn put_truth(draft: &Draft, truth: &impl Serialize) -> Result<()> {
+    let path = draft.root().join("truth.json");
+    let truth = serde_json::to_string_pretty(truth).unwrap_or_default() + "\n";
+    put(&path, &truth).in_file(&path)?;
+    Ok(())
 }
 
 /// Ground points on a regular grid that all lines see.
@@ -253,28 +323,38 @@ fn checked(orbit: &Orbit, lines: &[StereoLine], terrain: &Terrain) -> Vec<Checke
     checked.collect()
 }
 
-const CALIBRATION: &str = "\
-calibration = \"synthetic_loop\"
-description = \"Three synthetic lines from their pixels, after Li et al. 2023\"
+/// Lines of the camera.
+pub(super) const LINES: usize = 3;
 
+/// The cameras of a calibration file, whose file names begin with PREFIX, and its other inputs.
+pub(super) const CAMERAS: &str = "\
 [[cameras]]
 id = \"s1\"
-isd = \"isd/s1.json\"
-pixels = \"images/s1.tif\"
+isd = \"isd/PREFIXs1.json\"
+pixels = \"images/PREFIXs1.tif\"
 
 [[cameras]]
 id = \"nd\"
-isd = \"isd/nd.json\"
-pixels = \"images/nd.tif\"
+isd = \"isd/PREFIXnd.json\"
+pixels = \"images/PREFIXnd.tif\"
 
 [[cameras]]
 id = \"s2\"
-isd = \"isd/s2.json\"
-pixels = \"images/s2.tif\"
+isd = \"isd/PREFIXs2.json\"
+pixels = \"images/PREFIXs2.tif\"
 
 [ties]
 match = true
 
+";
+
+const NAME: &str = "\
+calibration = \"synthetic_loop\"
+description = \"Three synthetic lines from their pixels, after Li et al. 2023\"
+
+";
+
+const CONTROL: &str = "\
 [laser]
 files = [\"pedr/*.b\"]
 cell_m = 100

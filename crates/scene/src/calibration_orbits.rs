@@ -57,6 +57,8 @@ pub struct OrbitsScene {
     pub seed: u64,
     /// Orbits, a quarter of a year apart.
     pub orbits: u32,
+    /// Errors of orbits and attitudes over those of Li et al. 2023, Table 2.
+    pub orbit_errors: f64,
     /// Change of the roll of the second line relative to the first, pixels per year; scale and yaw change by half of this at the
     /// edge of the image.
     pub ageing_px_per_year: f64,
@@ -92,21 +94,17 @@ struct TrueOrbit {
 /// The lines after some years.
 fn lines(scene: &OrbitsScene, years: f64) -> [StereoLine; 2] {
     let half = 0.5 * f64::from(LONG[1]);
-    let pixel = StereoLine::pixel();
-    let aged = scene.ageing_px_per_year * years * pixel;
     let line = |name, pitch_deg: f64, angles_deg| {
         let sense = pitch_deg.signum();
-        let mut offset = drawn_offset(scene.seed, name, angles_deg);
-        // Half of a relative change in each line; s1 loses what s2 gains.
-        offset.phi_rad -= sense * 0.5 * aged;
-        offset.kappa_rad -= sense * 0.25 * aged / (half * pixel);
         let [m1, n1, n2] = [2e-7 * half, 1e-7 * half, 1e-11 * half * half];
-        StereoLine {
+        let mut line = StereoLine {
             name,
             pitch_deg,
-            offset,
-            errors: [sense * (m1 - 0.25 * aged), sense * n1, sense * n2],
-        }
+            offset: drawn_offset(scene.seed, name, angles_deg),
+            errors: [sense * m1, sense * n1, sense * n2],
+        };
+        line.age(scene.ageing_px_per_year * years * StereoLine::pixel(), half);
+        line
     };
     [
         line("s1", 18.9, [0.055, 0.020, 0.030]),
@@ -114,22 +112,39 @@ fn lines(scene: &OrbitsScene, years: f64) -> [StereoLine; 2] {
     ]
 }
 
-fn orbit(scene: &OrbitsScene, number: u32) -> Orbit {
+/// One of several orbits, with errors of its own, over ground of its own.
+pub(super) fn drawn_orbit(
+    scene: &OrbitsScene,
+    number: u32,
+    size: [u32; 2],
+    is_steered: bool,
+) -> Orbit {
     let mut random = Random::new(scene.seed, &format!("errors of orbit {number}"));
-    let [bias_m, drift_m_per_line] =
-        [ORBIT_M, DRIFT_M_PER_LINE].map(|sigma| [0; 3].map(|_| sigma * random.normal()));
+    let [bias_m, drift_m_per_line] = [ORBIT_M, DRIFT_M_PER_LINE]
+        .map(|sigma| [0; 3].map(|_| scene.orbit_errors * sigma * random.normal()));
     Orbit {
         name: format!("o{:02}", number + 1),
         start_et_s: 596_764_800.0 + f64::from(number) * APART_DAYS * SECONDS_PER_DAY,
         longitude_deg: random.between(-180.0, 180.0),
         latitude_deg: random.between(-50.0, 50.0),
-        size: LONG,
-        is_steered: false,
+        size,
+        is_steered,
         error: OrbitError {
             bias_m,
             drift_m_per_line,
         },
     }
+}
+
+/// Years of an orbit after the first one.
+pub(super) fn years_after(number: u32) -> f64 {
+    f64::from(number) * APART_DAYS / YEAR_DAYS
+}
+
+/// Error of the attitude of an orbit, degrees about the axes along the flight, across it and down.
+pub(super) fn drawn_attitude_deg(scene: &OrbitsScene, number: u32) -> [f64; 3] {
+    let mut random = Random::new(scene.seed, &format!("attitude of orbit {number}"));
+    [0; 3].map(|_| scene.orbit_errors * ATTITUDE_DEG * random.normal())
 }
 
 /// Writes a camera in several orbits into `directory`, replacing an older scene unless files were added or changed. The same
@@ -146,20 +161,16 @@ pub fn write_calibration_orbits(directory: &Path, scene: &OrbitsScene) -> Result
         orbits: BTreeMap::new(),
     };
     for number in 0..scene.orbits {
-        let orbit = orbit(scene, number);
-        let years = f64::from(number) * APART_DAYS / YEAR_DAYS;
+        let orbit = drawn_orbit(scene, number, LONG, false);
+        let years = years_after(number);
         let mut lines = lines(scene, years);
         let looks = lines.each_ref().map(|line| {
             let looks = line.truth(orbit.samples()).look_parameters();
             (line.name, looks)
         });
-        let mut random = Random::new(scene.seed, &format!("attitude of orbit {number}"));
-        let attitude_deg = [0; 3].map(|_| ATTITUDE_DEG * random.normal());
+        let attitude_deg = drawn_attitude_deg(scene, number);
         for line in &mut lines {
-            let [phi_deg, omega_deg, kappa_deg] = attitude_deg;
-            line.offset.phi_rad += phi_deg.to_radians();
-            line.offset.omega_rad += omega_deg.to_radians();
-            line.offset.kappa_rad += kappa_deg.to_radians();
+            line.turn(attitude_deg);
             let path = isd.join(format!("{}_{}.json", orbit.name, line.name));
             put(&path, &orbit.support_data(line)).in_file(&path)?;
         }

@@ -14,7 +14,8 @@
 //! | `archive`, `archive_frames` | PEDR files of any number of days, with kernels to check them |
 //! | `ties` | tie points of two images whose true positions and times differ from the nominal ones |
 //! | `calibration`, `pushbroom_pair` | two stereo lines of a camera for its calibration |
-//! | `calibration_loop`, `line_images` | three lines with their pixels and laser passes: the calibration from pixels |
+//! | `calibration_loop`, `line_images`, `line_light`, `compression` | three lines with their pixels and laser passes: the calibration from pixels |
+//! | `calibration_orbits`, `calibration_images` | an ageing camera in several orbits, by tables and by pixels |
 //! | `terrain_model`, `passes` | a shifted terrain model, laser passes over it |
 //! | `campaign` | pairs and single images of five mission phases with an index, without site files |
 //! | `kernels`, `pedr`, `sites`, `truth` | the files |
@@ -40,9 +41,11 @@ mod archive;
 mod archive_frames;
 mod attitude;
 mod calibration;
+mod calibration_images;
 mod calibration_loop;
 mod calibration_orbits;
 mod campaign;
+mod compression;
 mod context;
 mod drawn;
 mod error;
@@ -54,6 +57,7 @@ mod kernels;
 mod laser;
 mod later_orbit;
 mod line_images;
+mod line_light;
 mod mission;
 mod orbit;
 mod passes;
@@ -85,7 +89,10 @@ use areograph_geom::random;
 pub use along::write_scene_along;
 pub use archive::{ArchiveOptions, ArchiveSummary, write_archive};
 pub use calibration::write_calibration_scene;
-pub use calibration_loop::{LineScene, write_calibration_loop_scene, write_line_scene};
+pub use calibration_images::write_calibration_images;
+pub use calibration_loop::{
+    LineErrors, LineScene, OneOfOrbits, write_calibration_loop_scene, write_line_scene,
+};
 pub use calibration_orbits::{OrbitsScene, write_calibration_orbits};
 pub use campaign::{CampaignOptions, CampaignSummary, write_campaign};
 pub use error::SceneError;

@@ -7,9 +7,11 @@ use rayon::prelude::*;
 use tiff::encoder::{TiffEncoder, colortype::Gray8};
 
 use super::{
+    compression::compressed,
     error::SceneError,
+    line_light::Light,
     pushbroom_pair::{Orbit, StereoLine},
-    random::{mix, normal_of, unit_of},
+    random::{Random, mix, normal_of, unit_of},
     terrain::Terrain,
     value_noise::noise,
 };
@@ -17,7 +19,6 @@ use areograph_base::{
     error::{Error, IoError, Result},
     watch::Watch,
 };
-use areograph_geom::ellipsoid::local_axes;
 
 /// Spacings of the lattices of albedo, metres: the finest is two pixels.
 const LATTICES_M: [f64; 5] = [54.0, 108.0, 216.0, 432.0, 864.0];
@@ -29,8 +30,8 @@ const LEVEL_DN: [f64; 2] = [130.0, 12.0];
 const NOISE_DN: f64 = 1.0;
 /// Share of its light that a pixel receives from each neighbour on an axis.
 const BLUR: f64 = 0.12;
-/// Towards the Sun from the middle of the ground: east, north and up. All lines fly over within two minutes.
-const SUN: [f64; 3] = [-0.75, 0.25, 0.61];
+/// Largest deviation of the response of a line from the mean, where lines differ.
+const RESPONSE: f64 = 0.03;
 /// Height tolerance of the intersection with the ground, metres: a thousandth of a pixel.
 const TOLERANCE_M: f64 = 0.05;
 /// Lines that are rendered at a time.
@@ -41,6 +42,8 @@ pub(super) struct LineImages<'a> {
     pub(super) orbit: &'a Orbit,
     pub(super) terrain: &'a Terrain,
     pub(super) seed: u64,
+    /// Whether light and response differ between lines, the ground has shadows, and images lose by compression.
+    pub(super) is_fair: bool,
 }
 
 impl LineImages<'_> {
@@ -72,30 +75,36 @@ impl LineImages<'_> {
             strip
         });
         let strips: Vec<Vec<u8>> = strips.collect::<Result<_>>()?;
-        Ok(strips.concat())
+        let pixels = strips.concat();
+        Ok(if self.is_fair {
+            compressed(&pixels, self.orbit.size[1] as usize)
+        } else {
+            pixels
+        })
     }
 
     fn strip(&self, line: &StereoLine, lines: std::ops::Range<u32>) -> Result<Vec<u8>> {
-        let sun = self.sun();
+        let response = self.response(line);
         // Slopes require a point on every side, blurring another one.
-        let rows = i64::from(lines.start) - 2..i64::from(lines.end) + 2;
-        let rows = rows.map(|row| self.ground_m(line, row as f64 + 0.5));
+        let numbers = i64::from(lines.start) - 2..i64::from(lines.end) + 2;
+        let rows = numbers
+            .clone()
+            .map(|row| self.ground_m(line, row as f64 + 0.5));
         let rows: Option<Vec<Vec<Vector3<f64>>>> = rows.collect();
         let rows = rows.ok_or_else(|| SceneError::Image {
             image: line.name.to_owned(),
             error: format!("lines {} to {} miss the ground", lines.start, lines.end),
         })?;
-        let sharp: Vec<Vec<f64>> = rows
-            .windows(3)
-            .map(|rows| {
-                let (above, here, below) = (&rows[0], &rows[1], &rows[2]);
-                let number = |at: usize| {
-                    let slope = (here[at + 1] - here[at - 1]).cross(&(below[at] - above[at]));
-                    self.number(&here[at], &slope, &sun)
-                };
-                (1..here.len() - 1).map(number).collect()
-            })
-            .collect();
+        let sharp = rows.windows(3).zip(numbers.skip(1)).map(|(rows, number)| {
+            let (above, here, below) = (&rows[0], &rows[1], &rows[2]);
+            let light = self.light(line, number as f64 + 0.5);
+            let number = |at: usize| {
+                let slope = (here[at + 1] - here[at - 1]).cross(&(below[at] - above[at]));
+                response * self.number(&here[at], &slope, &light)
+            };
+            (1..here.len() - 1).map(number).collect()
+        });
+        let sharp: Vec<Vec<f64>> = sharp.collect();
         let mut pixels = Vec::new();
         for (rows, number) in sharp.windows(3).zip(lines) {
             let down =
@@ -109,9 +118,24 @@ impl LineImages<'_> {
         Ok(pixels)
     }
 
-    fn sun(&self) -> Vector3<f64> {
-        let middle = self.orbit.ground(0.5, 0.0);
-        local_axes(&middle).tr_mul(&Vector3::from(SUN)).normalize()
+    /// The light while a line of an image is exposed.
+    fn light(&self, line: &StereoLine, at_line: f64) -> Light {
+        if !self.is_fair {
+            return Light::steady(self.orbit);
+        }
+        let camera = line.truth(self.orbit.samples());
+        let pose = self.orbit.true_pose(line, &camera, at_line);
+        Light::of_line(self.orbit, line, at_line, pose.position_m)
+    }
+
+    /// The response of a line.
+    fn response(&self, line: &StereoLine) -> f64 {
+        if self.is_fair {
+            let mut random = Random::new(self.seed, &format!("response of {}", line.name));
+            1.0 + random.between(-RESPONSE, RESPONSE)
+        } else {
+            1.0
+        }
     }
 
     /// Ground at the middles of the samples of a line and of two more on either side.
@@ -139,9 +163,9 @@ impl LineImages<'_> {
     }
 
     /// The value of a ground point by its albedo and slope.
-    fn number(&self, ground_m: &Vector3<f64>, slope: &Vector3<f64>, sun: &Vector3<f64>) -> f64 {
+    fn number(&self, ground_m: &Vector3<f64>, slope: &Vector3<f64>, light: &Light) -> f64 {
         let normal = slope.normalize() * slope.dot(ground_m).signum();
-        let light = normal.dot(sun).max(0.0) / sun.dot(&ground_m.normalize());
+        let light = light.on(self.terrain, ground_m, &normal);
         let key = mix(self.seed ^ 0x00A1_BED0);
         let albedo: f64 = (0..)
             .zip(LATTICES_M)

@@ -11,7 +11,7 @@ use super::{
     orbit::Orbit,
     pedr::{PedrRequest, frame_tags, write_pedr},
     profile_shift::ProfileShift,
-    random::mix,
+    random::{Random, mix},
     terrain::Terrain,
 };
 use areograph_base::{
@@ -20,7 +20,10 @@ use areograph_base::{
     time::{Et, Interval},
     units::wrap_pi,
 };
-use areograph_geom::{body_rotation::body_matrix, ellipsoid::Spherical};
+use areograph_geom::{
+    body_rotation::body_matrix,
+    ellipsoid::{Spherical, spherical_to_xyz_m},
+};
 
 /// The first pass, ET seconds: 1999-03-01; the others follow by days.
 const START_S: f64 = -26_570_000.0;
@@ -39,6 +42,11 @@ pub(super) struct Passes {
     pub(super) half_width_m: f64,
     /// Half their length, seconds.
     pub(super) half_s: f64,
+    /// Number of the orbit of the first pass.
+    pub(super) first_orbit: u32,
+    /// Standard deviations of the shift of a pass in its file, metres: towards the east and the north each, and radially; 0 if
+    /// passes are exact.
+    pub(super) shift_sigma_m: [f64; 2],
 }
 
 impl Passes {
@@ -64,7 +72,7 @@ impl Passes {
         let northwards = number < of_direction;
         let pass = Pass::over(et, longitude_rad, self.latitude_rad, northwards);
         let tags = frame_tags(Interval::new(et.plus(-self.half_s), et.plus(self.half_s)));
-        let orbit = number + 1;
+        let orbit = self.first_orbit + number;
         let request = PedrRequest {
             name: &format!("ap{:05}l.b", 10_000 + orbit),
             tags: &tags,
@@ -73,10 +81,22 @@ impl Passes {
             seed: mix(seed ^ u64::from(number)),
             errors: LaserErrors {
                 altimeter: SceneErrors::realistic(Roughness::Rough).altimeter,
-                shift: ProfileShift::none(),
+                shift: self.shift(seed, number),
             },
         };
         write_pedr(folder, &pass, terrain, &request, |_| false).map(|_| ())
+    }
+
+    /// The shift of a pass in its file.
+    fn shift(&self, seed: u64, number: u32) -> ProfileShift {
+        let [plan_m, radial_m] = self.shift_sigma_m;
+        if plan_m.max(radial_m) <= 0.0 {
+            return ProfileShift::none();
+        }
+        let mut random = Random::new(seed, &format!("shift of pass {number}"));
+        let [east, north, up] = [0; 3].map(|_| random.normal());
+        let site = spherical_to_xyz_m(self.longitude_rad, self.latitude_rad, 1.0);
+        ProfileShift::near(&site, [plan_m * east, plan_m * north, radial_m * up])
     }
 }
 

@@ -36,7 +36,7 @@ impl ProfileShift {
     }
 
     /// The shift of a profile near `site`, a direction.
-    fn near(site: &Vector3<f64>, east_north_radial_m: [f64; 3]) -> Self {
+    pub(super) fn near(site: &Vector3<f64>, east_north_radial_m: [f64; 3]) -> Self {
         let [east_m, north_m, _] = east_north_radial_m;
         let east = Vector3::z().cross(site).normalize();
         let north = site.cross(&east);

@@ -96,6 +96,28 @@ impl StereoLine {
         PIXEL_MM / FOCAL_MM
     }
 
+    /// Ages the line: a change of roll between lines that look forward and backward, by `roll` tangents, half of it in each; yaw
+    /// and scale change by half of this at the edge of the image.
+    ///
+    /// * `half` – half the samples of a line
+    pub(super) fn age(&mut self, roll: f64, half: f64) {
+        let sense = if self.pitch_deg == 0.0 {
+            0.0
+        } else {
+            self.pitch_deg.signum()
+        };
+        self.offset.phi_rad -= sense * 0.5 * roll;
+        self.offset.kappa_rad -= sense * 0.25 * roll / (half * Self::pixel());
+        self.errors[0] -= sense * 0.25 * roll;
+    }
+
+    /// Rotates the line with the spacecraft, degrees about the axes along the flight, across it and down.
+    pub(super) fn turn(&mut self, [phi_deg, omega_deg, kappa_deg]: [f64; 3]) {
+        self.offset.phi_rad += phi_deg.to_radians();
+        self.offset.omega_rad += omega_deg.to_radians();
+        self.offset.kappa_rad += kappa_deg.to_radians();
+    }
+
     /// The true line, with `samples` samples.
     pub(super) fn truth(&self, samples: f64) -> LineCamera {
         let (sin, cos) = self.pitch_deg.to_radians().sin_cos();
@@ -148,7 +170,7 @@ impl Orbit {
         to_mars.transpose() * Matrix3::from_columns(&[up, along, up.cross(&along)])
     }
 
-    fn to_mars(et_s: f64) -> Matrix3<f64> {
+    pub(super) fn to_mars(et_s: f64) -> Matrix3<f64> {
         body_matrix(&MARS_IAU2000, Et::from_seconds(et_s))
     }
 
@@ -192,6 +214,11 @@ impl Orbit {
         Vector3::new(skew[(2, 1)], skew[(0, 2)], skew[(1, 0)])
     }
 
+    /// Exposure time of a line of a camera's image, ET seconds.
+    pub(super) fn exposed_s(&self, line: &StereoLine, at_line: f64) -> f64 {
+        self.first_s(line) + at_line * Self::period_s()
+    }
+
     /// Exposure time of the first line of a camera's image, whose middle looks at the middle of the stretch.
     fn first_s(&self, line: &StereoLine) -> f64 {
         let ahead_rad = line.pitch_deg.to_radians().tan() * HEIGHT_M / SPHERE_M;
@@ -232,7 +259,7 @@ impl Orbit {
         at_line: f64,
     ) -> TruePose {
         let period_s = Self::period_s();
-        let et_s = self.first_s(line) + at_line * period_s;
+        let et_s = self.exposed_s(line, at_line);
         let to_mars = Self::to_mars(et_s);
         // The images of all lines are centred on the middle of the stretch.
         let after_lines = (et_s - self.start_et_s) / period_s;

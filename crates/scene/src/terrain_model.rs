@@ -51,6 +51,8 @@ const PASSES: Passes = Passes {
     of_direction: 14,
     half_width_m: 27_000.0,
     half_s: 14.0,
+    first_orbit: 1,
+    shift_sigma_m: [0.0; 2],
 };
 
 /// `truth.json`.

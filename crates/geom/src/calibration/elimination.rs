@@ -55,14 +55,16 @@ impl Triangle {
         self.waiting_rows = 0;
     }
 
-    /// The triangle of the unknowns and its right side; missing rows are zero.
-    pub(super) fn finish(mut self) -> (DMatrix<f64>, DVector<f64>) {
+    /// The triangle of the unknowns, its right side, and the sum of the squares that no unknown reduces; missing rows are zero.
+    pub(super) fn finish(mut self) -> (DMatrix<f64>, DVector<f64>, f64) {
         self.fold();
         let mut square = DMatrix::zeros(self.unknowns, self.unknowns + 1);
         let held = self.rows.nrows().min(self.unknowns);
         square.rows_mut(0, held).copy_from(&self.rows.rows(0, held));
         let right = square.column(self.unknowns).into_owned();
-        (square.remove_column(self.unknowns), right)
+        let left = self.rows.column(self.unknowns);
+        let left = left.rows_range(held..).norm_squared();
+        (square.remove_column(self.unknowns), right, left)
     }
 }
 

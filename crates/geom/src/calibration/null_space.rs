@@ -124,7 +124,7 @@ pub fn tie_sight(
             .and_then(|place_m| reduced_rows(tie, state, &angles, &place_m));
         triangle.add(rows.map_err(|why| CalibrationError::Point { point, why })?);
     }
-    let (triangle, _) = triangle.finish();
+    let (triangle, _, _) = triangle.finish();
     let svd = triangle.svd(false, true);
     let largest = svd.singular_values.max();
     let names = names(layout.cameras);

@@ -10,10 +10,13 @@ use super::{
     sight::{GroundPoint, SightError},
 };
 
-/// Maximum number of steps.
-const STEPS_MAX: u32 = 40;
-/// A step below this ends the iteration, in standard deviations of the estimates.
+/// Maximum number of steps. Large residuals, as before the look angles are free, slow the convergence.
+const STEPS_MAX: u32 = 200;
+/// A step below this ends the iteration, in standard deviations of the estimates; these are multiplied by the root mean square of the residuals if
+/// it exceeds one.
 const STEP: f64 = 1e-3;
+/// Relative rounding errors of a sum of squares are smaller.
+const ROUNDING: f64 = 1e-9;
 
 /// Reasons why the calibration failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -66,14 +69,36 @@ pub fn solve(
     freedom: &Freedom,
 ) -> Result<Solved, CalibrationError> {
     let mut state = start.from.clone();
+    let mut last: Option<Step> = None;
     for steps in 1..=STEPS_MAX {
-        let (triangle, right, places_m) = linearised(points, &state, start.known, freedom)?;
+        let Linearised {
+            triangle,
+            right,
+            places_m,
+            squares,
+            redundancy,
+        } = linearised(points, &state, start.known, freedom)?;
+        // With residuals of many standard deviations, a whole step may lead away.
+        if let Some(last) = last
+            .as_mut()
+            .filter(|last| squares > (1.0 + ROUNDING) * last.squares)
+        {
+            last.step *= 0.5;
+            state = last.from.moved(&freedom.change(&last.step));
+            continue;
+        }
         let step = triangle
             .solve_upper_triangular(&right)
             .filter(|step| step.iter().all(|component| component.is_finite()))
             .ok_or(CalibrationError::Singular)?;
-        state = state.moved(&freedom.change(&step));
-        if (&triangle * &step).norm() > STEP {
+        let next = state.moved(&freedom.change(&step));
+        let length = (&triangle * &step).norm();
+        last = Some(Step {
+            from: std::mem::replace(&mut state, next),
+            step,
+            squares,
+        });
+        if length > STEP * (squares / redundancy.max(1) as f64).sqrt().max(1.0) {
             continue;
         }
         let unit = DMatrix::identity(freedom.len(), freedom.len());
@@ -93,8 +118,25 @@ pub fn solve(
     Err(CalibrationError::NotConverged)
 }
 
-/// Triangle and right side over the free combinations at a state, and the positions of the points there.
-type Linearised = (DMatrix<f64>, DVector<f64>, Vec<Vector3<f64>>);
+/// A step of the iteration.
+struct Step {
+    from: CalibrationState,
+    /// Over the free combinations.
+    step: DVector<f64>,
+    /// Weighted squares of the residuals at its beginning.
+    squares: f64,
+}
+
+/// Normal equations over the free combinations at a state.
+struct Linearised {
+    triangle: DMatrix<f64>,
+    right: DVector<f64>,
+    /// Positions of the points at the state.
+    places_m: Vec<Vector3<f64>>,
+    /// Weighted squares of all residuals at the state.
+    squares: f64,
+    redundancy: usize,
+}
 
 fn linearised(
     points: &[GroundPoint],
@@ -116,6 +158,13 @@ fn linearised(
         triangle.add(reduced_rows(point, state, freedom, &place_m).map_err(at)?);
         places_m.push(place_m);
     }
-    let (triangle, right) = triangle.finish();
-    Ok((triangle, right, places_m))
+    let redundancy = triangle.count.saturating_sub(unknowns);
+    let (triangle, right, left) = triangle.finish();
+    Ok(Linearised {
+        places_m,
+        squares: left + right.norm_squared(),
+        redundancy,
+        triangle,
+        right,
+    })
 }

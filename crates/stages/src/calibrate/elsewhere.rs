@@ -214,9 +214,9 @@ impl Compared {
         // Written so that NaN counts.
         (!(self.worse_sigmas() <= WORSE_MAX)).then(|| {
             format!(
-                "{}, a deterioration of more than {WORSE_MAX} standard deviations of measurement and laser: check the \
-                 datum, epoch, lines and samples of the laser points of both orbits, and the orbit accuracy in \
-                 [a_priori]",
+                "{}, a deterioration of more than {WORSE_MAX} standard deviations of measurement and laser: the orbits \
+                 differ in their errors by more than the calibration improves, or the laser points are wrong: check the datum, epoch, lines and \
+                 samples of the laser points of both orbits",
                 self.words()
             )
         })

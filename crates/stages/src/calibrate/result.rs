@@ -261,6 +261,8 @@ pub struct Rounds {
     pub rounds_max: u32,
     /// Edge of a cell of the terrain models, metres.
     pub cell_m: f64,
+    /// Standard deviation of the horizontal coordinates of the laser, each, metres.
+    pub laser_sigma_m: f64,
 }
 
 /// The numbers of a round: terrain model and units with the cameras of the previous round, then the cameras.
@@ -268,6 +270,8 @@ pub struct Rounds {
 pub struct CalibrationRound {
     /// From 1.
     pub round: u32,
+    /// Round in which the shots of its units were selected.
+    pub units_of: u32,
     /// Tie points.
     pub ties: u64,
     /// Their residuals in the worst line, root mean square, pixels, with the cameras that the terrain model was made with.

@@ -10,13 +10,20 @@ use crate::{
 use areograph_base::ties::MatchedPair;
 use areograph_geom::statistics::Summary;
 
-/// Rounds end when half of the units are shifted by less than this, cells, and residuals of control change by less than this share.
+/// Rounds end when half of the units are shifted by less than this, cells, apart from errors of the laser, and residuals of control change by
+/// less than this share.
 const SHIFT_CELLS: f64 = 0.5;
+/// Median length of a vector of two coordinates with a standard deviation of one: √(2 ln 2).
+const MEDIAN_LENGTH: f64 = 1.177;
 const CONTROL_SHARE: f64 = 0.02;
+/// After a round with a larger shift, cells, the shots of units are selected anew: the model that follows lies so far from the former one that
+/// other shots are on it.
+const SELECT_CELLS: f64 = 5.0;
 
 impl CalibrationRound {
     /// The numbers of round `round`.
     ///
+    /// * `units_of` – round in which the shots of its units were selected
     /// * `tied` – the calibration by tie points only, with whose cameras the terrain model was made
     /// * `filled` – share of that model with heights
     /// * `control` – the match of the laser with it
@@ -24,6 +31,7 @@ impl CalibrationRound {
     #[must_use]
     pub fn of(
         round: u32,
+        units_of: u32,
         tied: &Calibration,
         filled: f64,
         control: &LaserMatch,
@@ -54,6 +62,7 @@ impl CalibrationRound {
         };
         Self {
             round,
+            units_of,
             ties: figures(done).map_or(0, |of| of.ties.points),
             model_tie_px: worst_px(tied),
             tie_px: worst_px(done),
@@ -113,11 +122,15 @@ fn shift_cells(units: &[UnitResult]) -> f64 {
 
 impl Rounds {
     /// Share by which the residuals of control changed in the last round, root mean square over units that the last two
-    /// rounds used: units near the limits of a match vary from round to round. Infinite in the first.
+    /// rounds used: units near the limits of a match vary from round to round. Infinite in the first, and where the shots of units were
+    /// selected anew.
     fn control_share(&self) -> f64 {
         let [.., before, last] = &self.rounds[..] else {
             return f64::INFINITY;
         };
+        if before.units_of != last.units_of {
+            return f64::INFINITY;
+        }
         let both = || {
             let units = last.unit_px.iter();
             units.filter_map(|(unit, px)| Some([*before.unit_px.get(unit)?, *px]))
@@ -132,6 +145,12 @@ impl Rounds {
         }
     }
 
+    /// Limit of the median shift of units, cells: the errors of the laser shift units as well.
+    #[must_use]
+    pub fn shift_limit_cells(&self) -> f64 {
+        SHIFT_CELLS.hypot(MEDIAN_LENGTH * self.laser_sigma_m / self.cell_m)
+    }
+
     /// Median shift of units in the last round, cells.
     fn shift_cells(&self) -> f64 {
         self.rounds
@@ -139,10 +158,16 @@ impl Rounds {
             .map_or(f64::INFINITY, |round| round.shift_cells)
     }
 
+    /// Whether the next round selects the shots of units anew.
+    #[must_use]
+    pub fn selects_again(&self) -> bool {
+        self.shift_cells() > SELECT_CELLS
+    }
+
     /// Whether another round would change nothing significant.
     #[must_use]
     pub fn is_converged(&self) -> bool {
-        self.shift_cells() < SHIFT_CELLS && self.control_share() < CONTROL_SHARE
+        self.shift_cells() < self.shift_limit_cells() && self.control_share() < CONTROL_SHARE
     }
 }
 
@@ -164,8 +189,9 @@ impl Calibration {
             };
             reasons.push(format!(
                 "no convergence in {count} rounds: in the last round, units were shifted by {:.2} cells (median), and \
-                 residuals of control changed by {change}; expected less than {SHIFT_CELLS} cells and {:.0} %",
+                 residuals of control changed by {change}; expected less than {:.2} cells and {:.0} %",
                 rounds.shift_cells(),
+                rounds.shift_limit_cells(),
                 100.0 * CONTROL_SHARE
             ));
         }
@@ -187,7 +213,7 @@ impl Calibration {
             CheckKind::RoundShift,
             "",
             rounds.shift_cells(),
-            SHIFT_CELLS,
+            rounds.shift_limit_cells(),
             Fail,
         ));
         checks.push(Check::of_share(

@@ -1,6 +1,6 @@
 //! Laser control in the terrain model of the lines of a camera.
 
-use std::sync::atomic::AtomicBool;
+use std::{collections::BTreeMap, sync::atomic::AtomicBool};
 
 use serde::{Deserialize, Serialize};
 
@@ -39,8 +39,8 @@ stage_inputs! {
         pub held_back_every: &'a u32,
         /// PEDR files.
         pub pedr: InOrder<'a, HashedFile>,
-        /// The match of the first round, whose units later rounds use, so that rounds can be compared.
-        pub first: Option<&'a Output<ModelMatch>>,
+        /// The match of an earlier round whose units this round uses, so that rounds can be compared.
+        pub earlier: Option<&'a Output<ModelMatch>>,
     }
 }
 
@@ -75,7 +75,7 @@ pub struct ModelMatch {
 #[derive(Debug, thiserror::Error, Cause)]
 #[error(
     "{used} of {} units of laser shots and {judging} of {} withheld units match the terrain model of the images; \
-     expected at least {CONTROLS_MIN} of each. {example}", of[0], of[1]
+     expected at least {CONTROLS_MIN} of each. {commonest}", of[0], of[1]
 )]
 #[cause(Input: "check that cameras.pixels are not exchanged and that laser.files contain passes over this ground, \
     which must have relief; give more passes, or a larger laser.search_cells if errors of orbit and mounting are \
@@ -84,7 +84,7 @@ struct FewUnits {
     used: usize,
     judging: usize,
     of: [usize; 2],
-    example: String,
+    commonest: String,
 }
 
 impl Stage for MatchModel<'_> {
@@ -124,8 +124,8 @@ impl Stage for MatchModel<'_> {
                 seed,
             },
         };
-        let first = self.first.map(Output::value).transpose()?;
-        let (mut found, units) = match_model(&request, first.map(|of| &of.units), stop)?;
+        let earlier = self.earlier.map(Output::value).transpose()?;
+        let (mut found, units) = match_model(&request, earlier.map(|of| &of.units), stop)?;
         // Measurements of the other lines are removed: these lines are not part of the model.
         let pair = self.survey.value()?.pair;
         for point in &mut found.points {
@@ -150,13 +150,24 @@ fn few_units(control: &LaserMatch) -> Option<FewUnits> {
         let points = control.points.iter();
         points.filter(|point| point.judges == judges).count()
     };
-    let refused = control.units.iter().find(|unit| !unit.is_kept());
+    // Reasons differ in their numbers.
+    let kind = |reason: &str| reason.replace(|c: char| c.is_ascii_digit(), "");
+    let mut reasons: BTreeMap<String, Vec<&str>> = BTreeMap::new();
+    for unit in control.units.iter().filter(|unit| !unit.is_kept()) {
+        let reason = &*unit.refused_because;
+        reasons.entry(kind(reason)).or_default().push(reason);
+    }
+    let commonest = reasons.into_values().max_by_key(Vec::len);
     let few = FewUnits {
         used: points(false),
         judging: points(true),
         of: [false, true].map(units),
-        example: refused.map_or_else(String::new, |unit| {
-            format!("Unit {}: {}", unit.unit, unit.refused_because)
+        commonest: commonest.map_or_else(String::new, |units| {
+            format!(
+                "The most frequent reason, of {} units: {}",
+                units.len(),
+                units[0]
+            )
         }),
     };
     (few.used.min(few.judging) < CONTROLS_MIN).then_some(few)

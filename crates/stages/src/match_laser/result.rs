@@ -1,10 +1,14 @@
 //! Request and result of a match.
 
-use std::path::PathBuf;
+use std::{collections::BTreeMap, path::PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::{pass::Pass, similarity::Similarity, surface::SimilaritySurface};
+use super::{
+    pass::Pass,
+    similarity::{Moments, Similarity},
+    surface::SimilaritySurface,
+};
 use crate::{judge::Verdict, line_camera::LineCamera};
 use areograph_base::{
     altimetry::{GroundRadius, ShotFilter},
@@ -137,6 +141,39 @@ pub struct LaserMatch {
 }
 
 impl LaserMatch {
+    /// Concordance of heights of an earlier model and of this model with the laser, without any shift, at the held-out shots of every kept unit: its
+    /// number and both values. Units without a value by either model are left out.
+    ///
+    /// # Source
+    /// Li et al. 2023, eq. 18 and Table 4.
+    #[must_use]
+    pub fn concordances_after(&self, earlier: &Self) -> Vec<(usize, [f64; 2])> {
+        let shots = earlier.passes.iter().flat_map(|pass| &pass.shots);
+        let earlier_m: BTreeMap<&str, f64> = shots
+            .filter_map(|shot| Some((&*shot.name, shot.model_m?)))
+            .collect();
+        let mut pairs: BTreeMap<usize, Vec<[f64; 2]>> = BTreeMap::new();
+        let shots = self.passes.iter().flat_map(|pass| &pass.shots);
+        for shot in shots.filter(|shot| shot.is_held_out) {
+            if let Some((unit, model_m)) = shot.unit.zip(earlier_m.get(&*shot.name)) {
+                let of_unit = pairs.entry(unit).or_default();
+                of_unit.push([*model_m, shot.laser_m]);
+            }
+        }
+        let kept = self.units.iter().filter(|unit| unit.is_kept());
+        let concordances = kept.filter_map(|unit| {
+            let pairs = pairs.get(&unit.unit)?;
+            let [_, middle_m] = *pairs.first()?;
+            let mut moments = Moments::default();
+            for [model_m, laser_m] in pairs {
+                moments.add(model_m - middle_m, laser_m - middle_m);
+            }
+            let before = moments.similarity(Similarity::Ccc)?;
+            Some((unit.unit, [before, unit.concordance[0]?]))
+        });
+        concordances.collect()
+    }
+
     /// Kept units with the lowest, the median and the highest similarity, in this order; fewer where fewer are kept.
     #[must_use]
     pub fn examples(&self) -> Vec<&UnitResult> {

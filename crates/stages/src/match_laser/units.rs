@@ -15,8 +15,11 @@ const HELD_OUT_EVERY: usize = 4;
 /// A unit has more points than this, of at least this many passes.
 const POINTS_MIN: usize = 15;
 const STRIPS_MIN: usize = 2;
-/// A shift below a cell cannot improve held-out shots; they may be worse by this factor.
+/// A shift below a cell cannot improve held-out shots; they may be worse by this factor at least.
 const NO_SHIFT_SHARE: f64 = 1.1;
+/// With *n* used shots and *n*/3 held-out ones, noise alone makes the square of this factor less than 1 + 12/*n* (two standard
+/// deviations); shots of a pass share errors, and half of them count.
+const NO_SHIFT_NOISE: f64 = 24.0;
 /// Largest difference of a unit's shift from the median, cells: an orbit drifts by 7 over an image (Li et al. 2023:
 /// 0.01 m a line over 24,000 lines, cells of 35.8 m). In narrow searches the limit is this share of the reach: a tenth
 /// of chance shifts agree so closely.
@@ -177,7 +180,7 @@ impl<'a> Unit<'a> {
             .find_map(|(is_so, why)| is_so.then_some(why));
         wrong
             .or_else(|| settled.err().map(|why| why.to_string()))
-            .or_else(|| not_better(result.held_out.as_ref(), best.shift))
+            .or_else(|| not_better(result.held_out.as_ref(), best.shift, self.used.len()))
             .unwrap_or_default()
     }
 
@@ -246,12 +249,18 @@ fn found(grid: &HeightGrid, best: &Best, bias_m: f64, settled: Option<Settled>) 
 }
 
 /// Why held-out shots do not confirm a shift, if they do not.
-fn not_better(held_out: Option<&HeldOut>, [south, east]: [f64; 2]) -> Option<String> {
+fn not_better(held_out: Option<&HeldOut>, [south, east]: [f64; 2], used: usize) -> Option<String> {
     let Some(of) = held_out else {
         return Some("the model has too few heights at the held-out shots".to_owned());
     };
     let is_shifted = south.hypot(east) >= 1.0;
-    let most_m = of.before_m * if is_shifted { 1.0 } else { NO_SHIFT_SHARE };
+    let by_noise = (1.0 + NO_SHIFT_NOISE / used.max(1) as f64).sqrt();
+    let most_m = of.before_m
+        * if is_shifted {
+            1.0
+        } else {
+            NO_SHIFT_SHARE.max(by_noise)
+        };
     // Written so that NaN is rejected too.
     (!(of.after_m < most_m)).then(|| {
         format!(
