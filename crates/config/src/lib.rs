@@ -18,6 +18,7 @@
 //! ```
 
 mod adjustment;
+mod boresight;
 mod calibration;
 mod cameras;
 mod campaign;
@@ -59,6 +60,7 @@ use std::{
 };
 
 pub use adjustment::{AdjustmentConfig, OrientationPrior};
+pub use boresight::{BoresightOfSite, BoresightStatements, LaserMounting};
 pub use calibration::{
     APrioriConfig, CalibrationConfig, CalibrationLaserConfig, CalibrationMode, CameraConfig,
     SolutionConfig, ValidationConfig,
