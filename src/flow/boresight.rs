@@ -8,7 +8,7 @@ use super::readings::site_folders;
 use crate::{
     capabilities::declarations,
     config::{AdjustmentConfig, BoresightOfSite, BoresightStatements, LaserMounting},
-    error::{Cause, Result},
+    error::{Cause, Kind, Result},
     geom::boresight::{PooledBoresight, pooled},
     products::{PageData, SiteProducts},
     stages::adjust::{BoresightSummary, orbit_of},
@@ -136,7 +136,7 @@ impl EstimatedBoresight {
 /// * `prior_sigma_rad` – a priori standard deviation of each angle, radians, above 0
 ///
 /// # Errors
-/// Products that are missing, damaged or of a different version; no site that determines the boresight; different mountings.
+/// A folder without products; no site that determines the boresight; different mountings.
 pub fn estimate_boresight(folders: &[PathBuf], prior_sigma_rad: f64) -> Result<EstimatedBoresight> {
     let mut statements = BoresightStatements {
         prior_sigma_rad,
@@ -147,7 +147,16 @@ pub fn estimate_boresight(folders: &[PathBuf], prior_sigma_rad: f64) -> Result<E
     let mut first_sites: Vec<String> = Vec::new();
     let mut not_used = Vec::new();
     for folder in site_folders(folders)? {
-        let (site, found) = read_site(&folder)?;
+        let (site, found) = match read_site(&folder) {
+            Ok(read) => read,
+            // A site that failed does not prevent the use of the others.
+            Err(error) if error.cause.kind() == Kind::Input => {
+                let reason = error.cause.to_string();
+                not_used.push((folder.display().to_string(), reason));
+                continue;
+            }
+            Err(error) => return Err(error),
+        };
         let (of_site, mountings) = match found {
             Ok(found) => found,
             Err(reason) => {

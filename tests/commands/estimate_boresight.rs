@@ -202,6 +202,20 @@ fn sites_that_state_nothing_are_refused() {
         3,
         "no site determines the boresight of the laser; isidis: adjustment.common_bus is not used",
     );
+    // One that was never finished does not prevent the use of others.
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("manifest.json"), "{").unwrap();
+    let output = areograph()
+        .arg("estimate-boresight")
+        .args([folder.path(), &sites()])
+        .output()
+        .unwrap();
+    let printed = text(&output.stdout);
+    assert!(
+        printed.contains("by 3 sites") && printed.contains("not used: "),
+        "{printed} {}",
+        text(&output.stderr)
+    );
     let output = estimate(&["--prior-sigma-arcsec", "0"]);
     refused(&output, 2, "1e-3 to 1e5");
     let empty = tempfile::tempdir().unwrap();

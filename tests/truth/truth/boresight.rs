@@ -8,7 +8,7 @@ use areograph::{
 use serde_json::Value;
 
 use super::{
-    common::{case::Case, long},
+    common::{case::Case, long_test},
     flown::{Plan, Site, flown},
     is_within, root_mean_square,
 };
@@ -17,8 +17,8 @@ const FIRST_SEED: u32 = 220_000;
 const PRIOR_RAD: f64 = 1e-4;
 const KEYS: &str = "common_bus = \"yes\"\n";
 /// Missions of a group that state the boresight, and further ones that use it; three sites each.
-const STATING: [u32; 2] = [2, 6];
-const FURTHER: [u32; 2] = [1, 3];
+const STATING: u32 = 5;
+const FURTHER: u32 = 2;
 /// True angles towards X and Y of the bus in each group, radians; the last is beyond the a priori standard deviation.
 const TRUTHS: [[f64; 2]; 5] = [
     [-4e-5, 9e-5],
@@ -123,17 +123,14 @@ fn name_statements(case: &Case, seed: u32) {
 #[test]
 #[allow(clippy::print_stdout, reason = "what was measured is worth reading")]
 fn sites_together_determine_the_boresight_and_others_use_it() {
-    let [stating, further] = [STATING, FURTHER].map(|of| of[usize::from(long())]);
-    let groups: Vec<usize> = if long() {
-        (0..TRUTHS.len()).collect()
-    } else {
-        vec![4]
-    };
+    if !long_test("the boresight by 75 sites, and 30 others that use it, 20 minutes") {
+        return;
+    }
     let files = std::env::temp_dir().join(format!("areograph-boresight-{}", std::process::id()));
     std::fs::create_dir_all(&files).unwrap();
     let (mut ratios, mut without, mut with) = (Vec::new(), Vec::new(), Vec::new());
-    for group in groups {
-        let plans: Vec<_> = (0..stating).map(|of| plan(group, of, |_, _| {})).collect();
+    for group in 0..TRUTHS.len() {
+        let plans: Vec<_> = (0..STATING).map(|of| plan(group, of, |_, _| {})).collect();
         let statements = statements(&flown(&plans));
         let found = estimate(&statements);
         let (angles, sigmas) = (found.angles.angles_rad, found.angles.sigmas_rad());
@@ -158,7 +155,7 @@ fn sites_together_determine_the_boresight_and_others_use_it() {
         );
         ratios.push(off);
         std::fs::write(files.join(format!("{group}.toml")), statements.to_toml()).unwrap();
-        let missions = 50..50 + further;
+        let missions = 50..50 + FURTHER;
         let plain: Vec<_> = missions
             .clone()
             .map(|of| plan(group, of, |_, _| {}))
