@@ -134,16 +134,25 @@ pub fn pooled(sites: &[BoresightInformation], prior_sigma_rad: f64) -> PooledBor
     let kept = || used.iter().map(|of| &sites[*of]);
     let (scatter, freedom) = scatter(kept(), &solved(kept(), &weak, 1.0), least);
     let scale = scatter.max(1.0).powi(-2);
-    let contradicts_prior = [0, 1].map(|axis| {
-        // Of the other angle, which may not be determined, the a priori value applies.
-        let mut sigmas = [prior_sigma_rad; 2];
+    // A contradiction in a direction between both angles is one of the angle that the sites know better.
+    let known: Matrix2<f64> = kept().map(|of| of.matrix).sum();
+    let axes = if known[(0, 0)] > known[(1, 1)] {
+        [0, 1]
+    } else {
+        [1, 0]
+    };
+    let mut contradicts_prior = [false; 2];
+    let mut sigmas = [prior_sigma_rad; 2];
+    for axis in axes {
         sigmas[axis] = weak[axis];
         let alone = solved(kept(), &sigmas, scale);
         let expected = alone.covariance_rad2[(axis, axis)] + prior_sigma_rad.powi(2);
-        alone.angles_rad[axis].abs() > CONTRADICTION_SIGMAS * expected.sqrt()
-    });
-    let sigmas =
-        contradicts_prior.map(|is_wide| prior_sigma_rad * if is_wide { WIDER } else { 1.0 });
+        contradicts_prior[axis] =
+            alone.angles_rad[axis].abs() > CONTRADICTION_SIGMAS * expected.sqrt();
+        if !contradicts_prior[axis] {
+            sigmas[axis] = prior_sigma_rad;
+        }
+    }
     PooledBoresight {
         angles: solved(kept(), &sigmas, scale),
         contradicting,
