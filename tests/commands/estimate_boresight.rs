@@ -13,6 +13,7 @@ use std::{
 
 use serde_json::Value;
 
+use super::compare_readings::{refused, text};
 use crate::common::{
     json,
     mission::{areograph, mission, once, site_run, succeed},
@@ -20,19 +21,6 @@ use crate::common::{
 
 const SITES: [&str; 3] = ["eos_chasma", "gusev_crater", "isidis"];
 const KEYS: &str = "common_bus = \"yes\"\nrelief_for_plan = \"no\"\n";
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8(bytes.to_vec()).unwrap()
-}
-
-fn refused(output: &Output, code: i32, message: &str) {
-    let printed = text(&output.stderr);
-    assert!(
-        output.status.code() == Some(code) && printed.contains(message),
-        "{:?}: {printed}",
-        output.status
-    );
-}
 
 /// Writes the file of a site of the mission with these keys of the adjustment.
 fn site_file(folder: &Path, site: &str, keys: &str) -> PathBuf {

@@ -3,11 +3,9 @@
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
-use toml::Value;
 
 use super::{
-    data_file,
-    declare::{Form, Found, ValueKind},
+    printed_file::PrintedFile,
     problems::{Problems, Review},
 };
 use areograph_geom::boresight::BoresightInformation;
@@ -136,36 +134,12 @@ impl BoresightStatements {
     }
 }
 
-/// The path of such a file; its content belongs to the configuration.
-pub(super) struct BoresightFile;
-
-impl Form for BoresightFile {
-    type Value = BoresightStatements;
-
-    fn kind(&self) -> ValueKind {
-        ValueKind::File
-    }
-
-    fn read(&self, found: &Found<'_>, review: &mut Review<'_>) -> Option<BoresightStatements> {
-        let path = found
-            .value
-            .get_ref()
-            .as_str()
-            .map(|written| review.resolve(written));
-        let Some(path) = path.filter(|path| path.is_file()) else {
-            found.refuse(
-                review,
-                "the path of a file with the output of `areograph estimate-boresight --toml`",
-            );
-            return None;
-        };
-        data_file::named(&path, found, review, BoresightStatements::parse)
-    }
-
-    fn written(&self, _value: &BoresightStatements) -> Value {
-        Value::from("boresight.toml")
-    }
-}
+/// The path of such a file.
+pub(super) const BORESIGHT_FILE: PrintedFile<BoresightStatements> = PrintedFile {
+    expected: "the path of a file with the output of `areograph estimate-boresight --toml`",
+    usual: "boresight.toml",
+    parse: BoresightStatements::parse,
+};
 
 #[cfg(test)]
 mod tests {

@@ -39,6 +39,7 @@ mod orientation;
 mod paths;
 mod pedr;
 mod pointing;
+mod printed_file;
 mod problems;
 mod products;
 mod range_check;

@@ -160,8 +160,10 @@ fn errors_of_one_cause_alone_are_as_large_as_their_part() {
             cause.name,
             sites.len()
         );
-        sites.iter().for_each(|site| is_whole(site));
-        for axis in 0..3 {
+        for site in &sites {
+            is_whole(site);
+        }
+        for (axis, name) in AXES.into_iter().enumerate() {
             let rms = |of: &dyn Fn(&Stated) -> f64| {
                 let all: Vec<f64> = sites.iter().map(|site| of(site)).collect();
                 root_mean_square(all.into_iter())
@@ -173,7 +175,7 @@ fn errors_of_one_cause_alone_are_as_large_as_their_part() {
             println!(
                 "{}, {}: {error_m:.1} m, stated {part_m:.1} m of {whole_m:.1} m in all; ratio {ratio:.2} of {} sites",
                 cause.name,
-                AXES[axis],
+                name,
                 sites.len()
             );
             if cause.axes.contains(&axis) {

@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use nalgebra::{Matrix3, Vector2, Vector3};
 
 use super::{
-    boresight::{BoresightSummary, SpotsOfImage, prior_of},
+    boresight::{BoresightSummary, SpotsOfImage},
+    boresight_prior::prior_of,
     error::AdjustError,
     input::{AdjustImage, LaserShot, LaserShots, ShotRange},
     network::{Assembled, projector},

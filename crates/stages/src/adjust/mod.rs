@@ -29,6 +29,7 @@ mod adjusted;
 mod attitude_clock;
 mod blunders;
 mod boresight;
+mod boresight_prior;
 mod by_relief;
 mod common_bus;
 mod components;
@@ -55,7 +56,8 @@ pub use a_priori::accuracy_withheld;
 pub use adjusted::{
     Adjusted, CorrectedImage, CorrectedPoint, ImageResidual, RangeResidual, ScalarResidual,
 };
-pub use boresight::{BoresightPrior, BoresightSummary, SpotsOfImage, orbit_of};
+pub use boresight::{BoresightSummary, SpotsOfImage};
+pub use boresight_prior::{BoresightPrior, orbit_of};
 pub use components::WORSE_THAN_CONFIGURED;
 pub use error::AdjustError;
 pub use height_summary::HeightSummary;

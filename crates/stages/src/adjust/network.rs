@@ -6,7 +6,7 @@ use nalgebra::{Vector2, Vector3};
 
 use super::{
     attitude_clock::by_attitude_clock,
-    boresight::BoresightPrior,
+    boresight_prior::BoresightPrior,
     error::AdjustError,
     input::{AdjustImage, LaserShots},
     line_times::delay_sigma_s,
