@@ -398,7 +398,16 @@ fn working<T>(write: impl FnOnce(Watch<'_>) -> T) -> T {
 mod tests {
     use clap::Args as _;
 
-    use super::Arguments;
+    use super::{Arguments, boresight};
+
+    #[test]
+    fn a_boresight_is_two_angles_of_at_most_ten_milliradians() {
+        let [towards_x, towards_y] = boresight("0.2, -0.5").unwrap();
+        assert!((towards_x - 0.2).abs() < 1e-12 && (towards_y + 0.5).abs() < 1e-12);
+        for wrong in ["0.2", "0.2,a", "0.2,11", "0.1,0.2,0.3", "nan,0", ""] {
+            assert!(boresight(wrong).is_err(), "{wrong}");
+        }
+    }
 
     #[test]
     fn usage_names_every_scene() {
