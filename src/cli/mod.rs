@@ -5,6 +5,7 @@ mod campaign;
 mod check;
 mod compare_readings;
 mod completions;
+mod estimate_boresight;
 mod export;
 mod fetch;
 mod files;
@@ -111,6 +112,7 @@ enum Command {
     Pedr(pedr::Arguments),
     Report(report::Arguments),
     CompareReadings(compare_readings::Arguments),
+    EstimateBoresight(estimate_boresight::Arguments),
     Export(export::Arguments),
     Triangulate(triangulate::Arguments),
     Calibrate(calibrate::Arguments),
@@ -207,6 +209,7 @@ fn run(command: Command) -> ExitCode {
         Command::Pedr(arguments) => pedr::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),
         Command::CompareReadings(arguments) => finish(compare_readings::run(&arguments)),
+        Command::EstimateBoresight(arguments) => finish(estimate_boresight::run(&arguments)),
         Command::Export(arguments) => finish(export::run(&arguments)),
         Command::Triangulate(arguments) => triangulate::run(&arguments),
         Command::Calibrate(arguments) => calibrate::run(&arguments),

@@ -17,6 +17,9 @@ use crate::{
     watch::Watch,
 };
 
+/// Milliradians to radians.
+const RADIANS_PER_MRAD: f64 = 1e-3;
+
 /// Writes synthetic input with known truth: a mission, a campaign, a net, a calibration, a terrain model or an archive.
 ///
 /// Example: `areograph scene mission demo && areograph run demo/sites/*.toml --out products`
@@ -93,6 +96,16 @@ struct MissionArguments {
         value_parser = clock_offset
     )]
     attitude_clock_s: Option<f64>,
+    /// With --realistic: these angles between the laser and its mounting, towards X and Y of the bus, instead of random ones, -10 to
+    /// 10 each.
+    #[arg(
+        long,
+        value_name = "MRAD,MRAD",
+        requires = "realistic",
+        allow_hyphen_values = true,
+        value_parser = boresight
+    )]
+    boresight_mrad: Option<[f64; 2]>,
     /// Further laser passes over each site of narrow-angle images, on days without an image, 0 to 1000.
     #[arg(long, value_name = "COUNT", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=1000))]
     passes: u32,
@@ -260,6 +273,15 @@ fn clock_offset(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Two angles as typed.
+fn boresight(text: &str) -> Result<[f64; 2], String> {
+    let angles: Option<Vec<f64>> = text.split(',').map(|of| of.trim().parse().ok()).collect();
+    let angles = angles.and_then(|angles| <[f64; 2]>::try_from(angles).ok());
+    angles
+        .filter(|angles| angles.iter().all(|of| of.abs() <= 10.0))
+        .ok_or_else(|| "expected two numbers from -10 to 10, such as 0.2,-0.5".to_owned())
+}
+
 impl MissionArguments {
     fn errors(&self) -> SceneErrors {
         if !self.realistic {
@@ -276,10 +298,13 @@ impl MissionArguments {
         } else {
             realistic
         };
-        SceneErrors {
+        let mut errors = SceneErrors {
             tie_noise_px: self.tie_noise_px,
             ..drawn.with_drawn_sizes(self.target.seed)
-        }
+        };
+        let radians = |of: [f64; 2]| of.map(|mrad| mrad * RADIANS_PER_MRAD);
+        errors.altimeter.boresight_rad = self.boresight_mrad.map(radians);
+        errors
     }
 }
 
@@ -392,7 +417,16 @@ fn working<T>(write: impl FnOnce(Watch<'_>) -> T) -> T {
 mod tests {
     use clap::Args as _;
 
-    use super::Arguments;
+    use super::{Arguments, boresight};
+
+    #[test]
+    fn a_boresight_is_two_angles_of_at_most_ten_milliradians() {
+        let [towards_x, towards_y] = boresight("0.2, -0.5").unwrap();
+        assert!((towards_x - 0.2).abs() < 1e-12 && (towards_y + 0.5).abs() < 1e-12);
+        for wrong in ["0.2", "0.2,a", "0.2,11", "0.1,0.2,0.3", "nan,0", ""] {
+            assert!(boresight(wrong).is_err(), "{wrong}");
+        }
+    }
 
     #[test]
     fn usage_names_every_scene() {

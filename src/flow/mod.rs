@@ -7,6 +7,7 @@
 
 mod answers;
 mod archive;
+mod boresight;
 mod bounds;
 mod calibrated_images;
 mod calibration;
@@ -49,6 +50,7 @@ pub use answers::{check_answer, plan_answer, run_answer};
 pub use archive::{
     ArchiveFile, ArchiveRequest, ArchiveTask, ArchiveWorkers, archive_filter, archive_limits,
 };
+pub use boresight::{EstimatedBoresight, estimate_boresight, usual_boresight_sigma_rad};
 pub use campaign::{
     CAMPAIGN, Campaign, CampaignAnswer, CampaignSite, Costs, End, InputSize, LeftOut, PlannedSite,
     SITES, SiteEnd, SiteTask, publish_results, run_site_file, select_campaign,

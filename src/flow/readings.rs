@@ -106,12 +106,11 @@ pub fn readings_answer(readings: &Readings) -> Value {
     })
 }
 
-/// Compares the causes over the pairs of the sites whose products are in `folders`, each of one site or of several, with the
-/// orientation from the kernels.
+/// Folders of the sites whose products are in `folders`, each of one site or of several.
 ///
 /// # Errors
-/// Products that are missing, damaged or of a different version; no pair of images; images of several spacecraft.
-pub fn compare_readings(folders: &[PathBuf], sigmas: ReadingSigmas) -> Result<Readings> {
+/// A folder without products.
+pub(super) fn site_folders(folders: &[PathBuf]) -> Result<Vec<PathBuf>> {
     let mut of_sites = Vec::new();
     for folder in folders {
         if is_site_folder(folder) {
@@ -120,6 +119,16 @@ pub fn compare_readings(folders: &[PathBuf], sigmas: ReadingSigmas) -> Result<Re
             of_sites.extend(sites(folder)?.into_values());
         }
     }
+    Ok(of_sites)
+}
+
+/// Compares the causes over the pairs of the sites whose products are in `folders`, each of one site or of several, with the
+/// orientation from the kernels.
+///
+/// # Errors
+/// Products that are missing, damaged or of a different version; no pair of images; images of several spacecraft.
+pub fn compare_readings(folders: &[PathBuf], sigmas: ReadingSigmas) -> Result<Readings> {
+    let of_sites = site_folders(folders)?;
     let (mut pairs, mut not_used) = (Vec::new(), Vec::new());
     let (mut seen, mut spacecraft) = (BTreeSet::new(), BTreeSet::new());
     for folder in &of_sites {

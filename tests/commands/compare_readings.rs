@@ -18,11 +18,11 @@ fn sites() -> [PathBuf; 3] {
     ["eos_chasma", "gusev_crater", "isidis"].map(site_run)
 }
 
-fn text(bytes: &[u8]) -> String {
+pub(super) fn text(bytes: &[u8]) -> String {
     String::from_utf8(bytes.to_vec()).unwrap()
 }
 
-fn refused(output: &Output, code: i32, message: &str) {
+pub(super) fn refused(output: &Output, code: i32, message: &str) {
     let printed = text(&output.stderr);
     assert!(
         output.status.code() == Some(code) && printed.contains(message),

@@ -13,6 +13,7 @@ mod contradictions_attitude;
 mod corrections_over_isis;
 mod crossover_choice;
 mod damaged_kernels;
+mod estimate_boresight;
 mod example_kernels;
 mod export;
 mod fetch;

@@ -105,6 +105,7 @@ pub(crate) fn orthoimage() -> Orthoimage {
             jitter_m: None,
             drift_m: Some(2.75),
             shared_sigma_m: Some([113.0, 108.0]),
+            image_sigma_m: None,
             look: OrthoimageLook {
                 size: SIZE,
                 brightness: brightness.clone(),

@@ -18,8 +18,8 @@ use areograph::{
     pds::ties::read_ties,
     products::{
         ControlMeasure, ControlNetwork, ControlPoint, GroundEstimate, ImageMeasure, LidarPoint,
-        NetworkMeasure, NetworkPoint, ProfileShift, write_binary_network, write_control_network,
-        write_gcp, write_lidar_data,
+        NetworkMeasure, NetworkPoint, ProfileShift, SharedSigmas, write_binary_network,
+        write_control_network, write_gcp, write_lidar_data,
     },
     spice::{KernelSet, Session},
     stages::tag_times::tag_times,
@@ -442,9 +442,13 @@ fn ground_control_is_read_as_ames_stereo_pipeline_reads_it() {
         unmeasured,
         control("ap19215-41-7", west),
     ];
-    let shared_m = Some([103.04, 108.0, 1.75]);
-    assert_eq!(write_gcp(&path, Body::Mars, shared_m, &points).unwrap(), 2);
-    let text = fs::read_to_string(path).unwrap();
+    let mut shared = SharedSigmas {
+        sigma_m: [103.04, 108.0, 1.75],
+        of_all_sites_m: [25.0, 37.96, 0.0],
+    };
+    let written = write_gcp(&path, Body::Mars, Some(&shared), &points).unwrap();
+    assert_eq!(written, 2);
+    let text = fs::read_to_string(&path).unwrap();
     // Commas are blanks, lines that begin with # are comments, everything else is a point.
     let lines: Vec<Vec<String>> = text
         .lines()
@@ -488,8 +492,12 @@ fn ground_control_is_read_as_ames_stereo_pipeline_reads_it() {
             && text.contains("\n# 2 is ap19215-41-7\n")
     );
     assert!(
-        text.contains("# all points share an error with standard deviations of 103.0 m east, 108.0 m north and 1.8 m up")
+        text.contains("# all points share an error with standard deviations of 103.0 m east, 108.0 m north and 1.8 m up; other sites share a part of it, 25.0 m east, 38.0 m north and 0.0 m up;")
     );
+    shared.of_all_sites_m = [0.0; 3];
+    let own = folder.path().join("own.gcp");
+    write_gcp(&own, Body::Mars, Some(&shared), &points).unwrap();
+    assert!(!fs::read_to_string(own).unwrap().contains("other sites"));
     write_gcp(&folder.path().join("alone.gcp"), Body::Mars, None, &points).unwrap();
     let text = fs::read_to_string(folder.path().join("alone.gcp")).unwrap();
     assert!(text.contains("# all points share the error of the a priori orientations"));

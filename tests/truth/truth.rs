@@ -13,6 +13,7 @@ use crate::common;
 
 mod across;
 mod attitude_clock;
+mod boresight;
 mod campaign;
 mod common_bus;
 mod everything_errs;
@@ -22,6 +23,7 @@ mod light_time;
 mod misregistration;
 mod orbit;
 mod overlays;
+mod parts;
 mod profiles;
 mod readings;
 mod relief;

@@ -10,12 +10,13 @@ use areograph_base::{
 use areograph_geom::{readings::Cause, robust::RobustWeight, statistics::BAARDA_LIMIT};
 
 use super::{
+    boresight::{BORESIGHT_FILE, BoresightStatements},
     declare::{Declare as _, Keys, Many, declare_table, group, key, tables},
     forms::{
         Number, Several, above_to, from_to, identifier, several, words, words_of, yes_or_no,
         zero_or,
     },
-    readings::{DecisionFile, ReadingsDecision},
+    readings::{DECISION_FILE, ReadingsDecision},
     relief::ReliefForPlan,
     unknowns::{PositionUnknowns, RotationUnknowns},
 };
@@ -100,7 +101,7 @@ declare_table! {
         )).or(false),
         /// File with the result that `areograph compare-readings --toml` printed for many pairs of images. This result
         /// decides `attitude_clock`: "yes" if the pairs support one offset, otherwise "no".
-        readings: Option<ReadingsDecision> = key(DecisionFile).unused(r#""readings.toml""#),
+        readings: Option<ReadingsDecision> = key(DECISION_FILE).unused(r#""readings.toml""#),
         /// Standard deviation of the time offset of the attitudes (`attitude_clock`).
         attitude_clock_sigma_s: f64 = key(SIGMA).or(1.0),
         /// Upper limit of the standard deviations of constant image rotations with `attitude_clock`. The default
@@ -143,6 +144,9 @@ declare_table! {
         boresight_sigma_rad as "boresight_sigma_arcsec": f64 = key(SIGMA_OR_NONE)
             .or(20.6)
             .map(|sigma| sigma * RADIANS_PER_ARCSECOND),
+        /// File that `areograph estimate-boresight --toml` printed: statements of sites about the two boresight angles. Those of
+        /// sites without a common image or orbit with this site replace `boresight_sigma_arcsec`.
+        boresight: Option<BoresightStatements> = key(BORESIGHT_FILE).unused(r#""boresight.toml""#),
         /// Standard deviation of the delay of the line times of each image relative to the shots. Along the track, the
         /// delay cannot be separated from the laser boresight. Without this key, the along-track observation is not
         /// used, because `rotation_sigma_arcsec` already accounts for line times and pitch together; 0 assumes exact
@@ -230,6 +234,7 @@ fn keys_of_the_model(checked: &AdjustmentConfig, keys: &mut Keys<'_, '_>) {
             "attitude_clock_sigma_s",
             "attitude_clock_rotation_sigma_arcsec",
             "common_bus",
+            "boresight",
             "boresight_sigma_arcsec",
             "boresight_line_time_sigma_ms",
             "height_blunder_limit",
@@ -241,6 +246,13 @@ fn keys_of_the_model(checked: &AdjustmentConfig, keys: &mut Keys<'_, '_>) {
     }
     if checked.readings.is_some() && checked.model == AdjustmentModel::MolaSurface {
         keys.unused("attitude_clock", "adjustment.readings decides");
+    }
+    if checked.boresight.is_some() && checked.model == AdjustmentModel::MolaSurface {
+        if checked.common_bus {
+            keys.unused("boresight_sigma_arcsec", "adjustment.boresight replaces it");
+        } else {
+            keys.unused("boresight", "adjustment.common_bus is \"no\"");
+        }
     }
 }
 

@@ -18,6 +18,7 @@
 //! ```
 
 mod adjustment;
+mod boresight;
 mod calibration;
 mod cameras;
 mod campaign;
@@ -38,6 +39,7 @@ mod orientation;
 mod paths;
 mod pedr;
 mod pointing;
+mod printed_file;
 mod problems;
 mod products;
 mod range_check;
@@ -59,6 +61,7 @@ use std::{
 };
 
 pub use adjustment::{AdjustmentConfig, OrientationPrior};
+pub use boresight::{BoresightOfSite, BoresightStatements, LaserMounting};
 pub use calibration::{
     APrioriConfig, CalibrationConfig, CalibrationLaserConfig, CalibrationMode, CameraConfig,
     SolutionConfig, ValidationConfig,

@@ -3,13 +3,8 @@
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
-use toml::Value;
 
-use super::{
-    data_file,
-    declare::{Form, Found, ValueKind},
-    problems::{Problems, Review},
-};
+use super::{data_file, printed_file::PrintedFile, problems::Problems};
 use areograph_geom::readings::{Cause, DECISIVE_ODDS};
 
 /// The comparison of two causes over many pairs of images.
@@ -96,36 +91,12 @@ impl ReadingsDecision {
     }
 }
 
-/// The path of such a file; its content belongs to the configuration.
-pub(super) struct DecisionFile;
-
-impl Form for DecisionFile {
-    type Value = ReadingsDecision;
-
-    fn kind(&self) -> ValueKind {
-        ValueKind::File
-    }
-
-    fn read(&self, found: &Found<'_>, review: &mut Review<'_>) -> Option<ReadingsDecision> {
-        let path = found
-            .value
-            .get_ref()
-            .as_str()
-            .map(|written| review.resolve(written));
-        let Some(path) = path.filter(|path| path.is_file()) else {
-            found.refuse(
-                review,
-                "the path of a file with the output of `areograph compare-readings --toml`",
-            );
-            return None;
-        };
-        data_file::named(&path, found, review, ReadingsDecision::parse)
-    }
-
-    fn written(&self, _value: &ReadingsDecision) -> Value {
-        Value::from("readings.toml")
-    }
-}
+/// The path of such a file.
+pub(super) const DECISION_FILE: PrintedFile<ReadingsDecision> = PrintedFile {
+    expected: "the path of a file with the output of `areograph compare-readings --toml`",
+    usual: "readings.toml",
+    parse: ReadingsDecision::parse,
+};
 
 #[cfg(test)]
 mod tests {

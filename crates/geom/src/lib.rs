@@ -29,6 +29,7 @@ pub mod attitude;
 pub mod block_equations;
 mod blocked_cholesky;
 pub mod body_rotation;
+pub mod boresight;
 pub mod bundle;
 pub mod calibration;
 pub mod chebyshev;

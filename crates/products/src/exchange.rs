@@ -22,7 +22,7 @@ pub use contours::{ContourLayer, write_contours};
 pub use control_network::{ControlNetwork, NetworkMeasure, NetworkPoint, write_control_network};
 pub use gcp::{ControlMeasure, ControlPoint, write_gcp};
 pub use lidar_data::{LidarPoint, ProfileShift, write_lidar_data};
-pub use points::{GroundEstimate, ImageMeasure};
+pub use points::{GroundEstimate, ImageMeasure, SharedSigmas};
 pub use qgis::{on_ground_m, tie_residuals};
 
 /// Decimals of degrees: 1e-9° are 0.06 mm on the ground.

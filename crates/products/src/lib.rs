@@ -86,8 +86,9 @@ pub use campaign::{
 };
 pub use exchange::{
     ContourLayer, ControlMeasure, ControlNetwork, ControlPoint, GroundEstimate, ImageMeasure,
-    LidarPoint, NetworkMeasure, NetworkPoint, ProfileShift, on_ground_m, tie_residuals,
-    write_binary_network, write_contours, write_control_network, write_gcp, write_lidar_data,
+    LidarPoint, NetworkMeasure, NetworkPoint, ProfileShift, SharedSigmas, on_ground_m,
+    tie_residuals, write_binary_network, write_contours, write_control_network, write_gcp,
+    write_lidar_data,
 };
 pub use files::{read_bytes, write_bytes, write_json};
 pub use found_shots::{ShotBatches, ShotsFile};

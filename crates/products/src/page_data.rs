@@ -39,7 +39,7 @@ use areograph_store::{
 };
 
 /// Types of the outputs and their layout. The number is raised when one of them changes without a new version.
-const LAYOUT: &str = concat!("version ", env!("CARGO_PKG_VERSION"), ", layout 3");
+const LAYOUT: &str = concat!("version ", env!("CARGO_PKG_VERSION"), ", layout 4");
 
 /// Its path below a site's folder.
 pub const PAGE_DATA: &str = "report/page.postcard";

@@ -1,6 +1,7 @@
 //! Heights of tie points above the MOLA surface, and statements of their accuracy.
 
 mod boresight;
+mod parts;
 mod profile;
 mod readings;
 mod relief;
@@ -127,8 +128,12 @@ fn statements(
     } else {
         relief::relief(adjustment.adjusted, known_beforehand(geometric))
     };
+    let heights = adjustment.adjusted.heights.as_ref();
     html! {
         (table.finish())
+        @if let Some(heights) = heights.filter(|_| !is_withheld) {
+            (parts::parts(heights, site.config.terms()))
+        }
         (relief)
         (boresight::boresight(adjustment.adjusted))
         (readings::two_readings(adjustment.adjusted, is_withheld))

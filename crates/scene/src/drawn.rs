@@ -190,8 +190,8 @@ impl DayErrors {
             .as_ref()
             .map_or_else(Vector3::zeros, |of| of.constant_rad);
         let mut boresight = Random::new(seed, "boresight");
-        let boresight_rad =
-            [0, 1].map(|_| errors.altimeter.boresight_sigma_rad * boresight.normal());
+        let drawn_rad = [0, 1].map(|_| errors.altimeter.boresight_sigma_rad * boresight.normal());
+        let boresight_rad = errors.altimeter.boresight_rad.unwrap_or(drawn_rad);
         Self {
             time_bias_lines,
             attitude_clock_s,
@@ -372,6 +372,13 @@ mod tests {
             let in_bus = flown.j2000_to_bus(et) * flown.beam(et).unwrap().direction;
             let expected = Vector3::new(towards_x, towards_y, 1.0);
             assert!((in_bus - expected).norm() < 1e-6); // squares of 0.5 mrad
+        }
+        let mut errors = errors;
+        errors.altimeter.boresight_rad = Some([2e-4, -5e-4]);
+        for image in &IMAGES {
+            let drawn = DayErrors::draw(&errors, &arc(image), 2);
+            let [towards_x, towards_y] = drawn.boresight_rad;
+            assert!((towards_x - 2e-4).abs() < 1e-12 && (towards_y + 5e-4).abs() < 1e-12);
         }
     }
 

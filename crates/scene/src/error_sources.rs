@@ -128,6 +128,9 @@ pub struct AltimeterErrors {
     /// Standard deviation of each of the two angles between the laser and +Z of the bus, radians: constant over the
     /// mission.
     pub boresight_sigma_rad: f64,
+    /// These angles towards X and Y of the bus instead of random ones, so that missions may share them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub boresight_rad: Option<[f64; 2]>,
     /// Whether files contain the instrument's echo data: channel 4, energies, pulse widths, thresholds.
     #[serde(skip)]
     pub tells_echoes: bool,
@@ -219,6 +222,7 @@ impl SceneErrors {
                 range_step_m: 0.0,
                 spot_m: 0.0,
                 boresight_sigma_rad: 0.0,
+                boresight_rad: None,
                 tells_echoes: false,
             },
             camera: CameraErrors::NONE,
@@ -275,6 +279,7 @@ impl SceneErrors {
                 range_step_m: 0.375,
                 spot_m: 75.0,
                 boresight_sigma_rad: 1e-4,
+                boresight_rad: None,
                 tells_echoes: true,
             },
             camera: CameraErrors::NONE,

@@ -205,6 +205,7 @@ mod tests {
                 plan_sigma_m: 0.0,
                 radial_sigma_m: 0.0,
                 boresight_sigma_rad: 0.0,
+                boresight_rad: None,
                 attitude_share_max: [1.0; 2],
                 ..SceneErrors::realistic(Roughness::Plains).altimeter
             },

@@ -335,10 +335,14 @@ struct Entry<'a> {
     /// the usual errors of kernels.
     #[serde(skip_serializing_if = "Option::is_none")]
     drift_m: Option<f64>,
-    /// Standard deviations of the shared error, east and north: of all images by the adjustment, or of this image by the usual errors
-    /// of kernels; omitted for an adjustment without heights.
+    /// Standard deviations of the error that all adjusted images of the site share, east and north; omitted without an adjustment of
+    /// heights.
     #[serde(skip_serializing_if = "Option::is_none")]
     shared_sigma_m: Option<[f64; 2]>,
+    /// Without an adjustment: standard deviations of the error that all places of this image share, but no other image, east and
+    /// north, by the usual errors of kernels.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    image_sigma_m: Option<[f64; 2]>,
 }
 
 impl<'a> Document<'a> {
@@ -361,6 +365,7 @@ impl<'a> Document<'a> {
                 jitter_m: of.jitter_m,
                 drift_m: of.drift_m,
                 shared_sigma_m: of.shared_sigma_m,
+                image_sigma_m: of.image_sigma_m,
             }
         });
         Ok(Self {

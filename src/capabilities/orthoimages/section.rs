@@ -84,11 +84,15 @@ fn table(site: &SiteProducts, orthoimages: &[Orthoimage]) -> Markup {
             Cell::from(label(value, decimals)).traced(place)
         };
         let count = |count: u32, place: &str| Cell::from(whole(count)).traced(place);
-        let shared = of.shared_sigma_m.map_or_else(
+        let (shared_m, name) = match of.image_sigma_m {
+            Some(image_m) => (Some(image_m), "image_sigma_m"),
+            None => (of.shared_sigma_m, "shared_sigma_m"),
+        };
+        let shared = shared_m.map_or_else(
             || Cell::from("not known"),
             |[east_m, north_m]| {
                 Cell::from(format!("{}, {}", label(east_m, 0), label(north_m, 0)))
-                    .traced("/shared_sigma_m/0 /shared_sigma_m/1")
+                    .traced(format!("/{name}/0 /{name}/1"))
             },
         );
         let of_adjustment = |value: Option<f64>, place: &str| {

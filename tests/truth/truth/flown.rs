@@ -63,6 +63,8 @@ pub(super) struct Stated {
     pub(super) clocks: [Vec<Pair>; 2],
     /// Remarks of the verdict.
     pub(super) remarks: String,
+    /// The adjustment as stated.
+    pub(super) adjustment: Value,
 }
 
 impl Site {
@@ -361,6 +363,7 @@ impl Plan<'_> {
             ties: ties(mission, out, site),
             cameras: cameras(own, &document, &folder),
             clocks: clocks(truth, &folder),
+            adjustment: document["adjustment"].clone(),
         });
         Site {
             name: format!("{} {site}", self.seed),

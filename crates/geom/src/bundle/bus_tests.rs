@@ -1,7 +1,7 @@
 //! Spots of a laser on the bus of the cameras: derivatives, signs, and the partitioned equations against the dense
 //! ones.
 
-use nalgebra::{Matrix3, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
 use super::{
     AttitudeClock, BundleOptions, CommonBus, HeightControl, Network, RecordedProfile,
@@ -14,6 +14,7 @@ use super::{
     unknowns::{State, Unknown},
 };
 use crate::{
+    boresight::BoresightAngles,
     collinearity::project,
     ellipsoid::local_axes,
     pushbroom::{Distortion, EulerPolynomial, ExteriorOrientation, Sighting},
@@ -27,7 +28,7 @@ const RANGE_M: f64 = 380e3;
 const SHOTS: std::ops::Range<usize> = 0..4;
 
 /// The network with a spot of each shot in the image during which it was fired, where the initial orientation sees it.
-fn with_spots() -> Network<EulerPolynomial> {
+pub(super) fn with_spots() -> Network<EulerPolynomial> {
     let mut network = network();
     let spots = network.ranges.iter().map(|range| {
         let image = &network.images[range.image];
@@ -47,7 +48,10 @@ fn with_spots() -> Network<EulerPolynomial> {
         }
     });
     network.common_bus = Some(CommonBus {
-        boresight_sigma_rad: 1e-4,
+        boresight: BoresightAngles {
+            angles_rad: Vector2::new(6e-5, -4e-5),
+            covariance_rad2: Matrix2::new(1e-8, -4e-9, -4e-9, 6e-9),
+        },
         line_time_sigma_s: 0.045,
         profiles: vec![RecordedProfile {
             surface_profile: 1,
@@ -295,7 +299,7 @@ fn spots_tell_a_roll_that_ties_do_not_know() {
     bus.profiles[0].sigma_m = Vector3::new(1.0, 1.0, 1.0);
     bus.profiles[0].shared = None;
     bus.profiles[0].axes = Matrix3::identity();
-    bus.boresight_sigma_rad = 1e-6;
+    bus.boresight = BoresightAngles::of_sigma(1e-6);
     let adjusted = solve(&network, &BundleOptions::default()).unwrap();
     // With that roll, the spots fall on ground farther along the y axis of the camera.
     for image in 0..2 {

@@ -88,7 +88,15 @@ fn check_view<M>(network: &Network<M>, part: Part, view: &View) -> Result<(), Bu
 fn check_bus<M>(network: &Network<M>, bus: &CommonBus) -> Result<(), BundleError> {
     let part = Part::Images;
     let what = "standard deviation of the laser boresight";
-    deviation(part, what, bus.boresight_sigma_rad)?;
+    for sigma_rad in bus.boresight.sigmas_rad() {
+        deviation(part, what, sigma_rad)?;
+    }
+    for angle_rad in &bus.boresight.angles_rad {
+        finite(part, "a priori laser boresight", *angle_rad)?;
+    }
+    let determinant = bus.boresight.covariance_rad2.determinant();
+    let what = "determinant of the covariance of the laser boresight";
+    deviation(part, what, determinant)?;
     let what = "standard deviation of the line-time offset relative to the laser";
     deviation(part, what, bus.line_time_sigma_s)?;
     if bus.profiles.len() != network.range_bias_sigmas_m.len() {

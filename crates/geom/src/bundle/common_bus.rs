@@ -8,16 +8,16 @@
 //! # Source
 //! A choice; the boresight of the narrow-angle camera was found in flight against the altimeter (Kirk et al. 2001).
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix2, Matrix3, Vector3};
 
 use super::{Residual, View};
+use crate::boresight::BoresightAngles;
 
 /// A laser that shares its bus with the cameras of the images.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CommonBus {
-    /// Standard deviation of each of the two angles between the laser's actual pointing and its mounting, the same for
-    /// all images, radians.
-    pub boresight_sigma_rad: f64,
+    /// A priori values of the two angles between the laser's actual pointing and its mounting, the same for all images.
+    pub boresight: BoresightAngles,
     /// Standard deviation of the delay of an image's line times against the shots, one unknown an image, seconds;
     /// infinite where spots give no information along the track, 0 where line times are exact.
     pub line_time_sigma_s: f64,
@@ -66,6 +66,8 @@ pub struct Spot {
 pub struct AdjustedBus {
     /// The angles of the boresight.
     pub boresight_rad: [Estimate; 2],
+    /// Cofactors of these.
+    pub boresight_cofactors: Matrix2<f64>,
     /// Delay of the lines of each image, seconds, where it has spots and the delay is unknown.
     pub line_times_s: Vec<Option<Estimate>>,
     /// Recorded minus true position of each profile, towards east, north and up, metres.

@@ -1,5 +1,7 @@
 //! Single unknowns of the converged adjustment: their values, cofactors and expected values.
 
+use nalgebra::Matrix2;
+
 use super::{AdjustedBus, Estimate, Residual, layout::Layout, unknowns::State};
 use crate::block_equations::BlockMatrix;
 
@@ -58,8 +60,22 @@ pub(super) fn of_bus<M>(
     let or_held = |column: Option<usize>| column.map(found).unwrap_or_default();
     let times = columns.line_time_of_image.iter();
     let shifts = columns.shift_of_profile.iter();
+    let boresight = columns.boresight;
+    let boresight_cofactors = Matrix2::from_fn(|row, column| {
+        let both = boresight[row].zip(boresight[column]);
+        let element = both.and_then(|(row, column)| cofactors.element(row, column));
+        element.unwrap_or_default()
+    });
+    let angle = |axis: usize| {
+        let held = Estimate {
+            value: bus.boresight.angles_rad[axis],
+            ..Estimate::default()
+        };
+        boresight[axis].map_or(held, found)
+    };
     Some(AdjustedBus {
-        boresight_rad: columns.boresight.map(or_held),
+        boresight_rad: [0, 1].map(angle),
+        boresight_cofactors,
         line_times_s: times.map(|column| column.map(found)).collect(),
         profile_shifts_m: shifts.map(|shift| shift.map(or_held)).collect(),
         spots: vec![None; bus.spots.len()],

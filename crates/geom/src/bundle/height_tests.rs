@@ -8,7 +8,7 @@ use super::{
     groups::PointGroups,
     heights::Heights,
     layout::Linearised,
-    prior_tests::{prior_row, prior_variance},
+    prior_tests::{expected, prior_row, prior_variance},
     quality::judge,
     reduce::Settled,
     solve,
@@ -100,14 +100,14 @@ fn attitude_clock() -> AttitudeClock {
 }
 
 /// The converged network with heights of full covariance, and its statistics.
-struct Dense {
+pub(super) struct Dense {
     /// Inverse of the normal matrix of all unknowns, and its solution there.
-    cofactors: DMatrix<f64>,
+    pub(super) cofactors: DMatrix<f64>,
     step: DVector<f64>,
 }
 
 /// The equations of all unknowns at `state`, heights included, solved at once.
-fn dense(
+pub(super) fn dense(
     layout: &super::layout::Layout<'_, EulerPolynomial>,
     at: &Linearised,
     heights: &Heights,
@@ -124,7 +124,7 @@ fn dense(
     }
     for (column, sigma) in layout.columns.sigmas.iter().enumerate() {
         let row = prior_row(layout, column, unknowns);
-        let off = row.rows(0, shared).dot(&at.state.corrections);
+        let off = row.rows(0, shared).dot(&at.state.corrections) - expected(layout, column);
         normal += &row * row.transpose() * sigma.powi(-2);
         right -= row * (off * sigma.powi(-2));
     }

@@ -103,6 +103,7 @@ mod heights;
 mod jitter;
 mod known;
 mod layout;
+mod mean_parts;
 mod part;
 mod point_rows;
 mod quality;
@@ -123,6 +124,8 @@ mod height_tests;
 #[cfg(test)]
 mod jitter_tests;
 #[cfg(test)]
+mod mean_parts_tests;
+#[cfg(test)]
 mod prior_tests;
 #[cfg(test)]
 mod tests;
@@ -133,6 +136,7 @@ pub use common_bus::{AdjustedBus, CommonBus, Estimate, RecordedProfile, SharedRo
 pub use control::{CommonNoise, HeightControl, Jitter};
 pub use error::BundleError;
 pub use known::KnownCoordinates;
+pub use mean_parts::MeanParts;
 pub use part::Part;
 pub use relief::{ProfileShift, ReliefOfSite};
 pub use solve::{solve, solve_comparing};
@@ -406,6 +410,8 @@ pub struct Adjustment {
     pub relief: Option<ReliefOfSite>,
     /// Cofactors of the mean of the points with an observed height, m²: common errors do not average out.
     pub mean_cofactor_m2: Option<Matrix3<f64>>,
+    /// Parts of these by cause.
+    pub mean_parts: Option<MeanParts>,
     /// Scalar observations, initial values with a standard deviation included.
     pub observations: usize,
     /// Unknowns.

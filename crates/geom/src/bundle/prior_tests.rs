@@ -24,7 +24,31 @@ pub(super) fn prior_row(
             row[roll.unwrap()] = -shared.by_rotation_m[axis];
         }
     }
+    if layout.columns.unknowns[column] == (Unknown::Boresight { axis: 1 }) {
+        let bus = layout.network.common_bus.as_ref().unwrap();
+        let first = Unknown::Boresight { axis: 0 };
+        let first = layout.columns.unknowns.iter().position(|of| *of == first);
+        let covariance = &bus.boresight.covariance_rad2;
+        row[first.unwrap()] = -covariance[(0, 1)] / covariance[(0, 0)];
+    }
     row
+}
+
+/// Expected value of that difference.
+pub(super) fn expected(layout: &Layout<'_, EulerPolynomial>, column: usize) -> f64 {
+    let Unknown::Boresight { axis } = layout.columns.unknowns[column] else {
+        return 0.0;
+    };
+    let bus = layout.network.common_bus.as_ref().unwrap();
+    let row = prior_row(layout, column, layout.columns.len());
+    let of = |axis| Unknown::Boresight { axis };
+    (0..=axis)
+        .map(|axis| {
+            let unknowns = &layout.columns.unknowns;
+            let place = unknowns.iter().position(|unknown| *unknown == of(axis));
+            row[place.unwrap()] * bus.boresight.angles_rad[axis]
+        })
+        .sum()
 }
 
 /// Variance of an unknown minus its expected value, of the cofactors of all shared unknowns.

@@ -9,6 +9,7 @@ use super::{
     factor::Factor,
     groups::{Group, PointGroups},
     layout::{Layout, Linearised},
+    mean_parts::MeanParts,
     point_rows::PointRows,
     reduce::Settled,
     reduced_heights::ReducedHeights,
@@ -112,6 +113,7 @@ pub(super) fn judge<M: ExteriorOrientation>(
         compared: Vec::new(),
         height_squares: 0.0,
         mean_cofactor_m2: None,
+        mean_parts: None,
         relief: None,
         observations: 0,
         unknowns: 0,
@@ -149,6 +151,7 @@ pub(super) fn judge<M: ExteriorOrientation>(
         adjustment.weighted_squares += adjustment.height_squares;
         if let Some(mean) = Mean::of(layout, at, &of.points, factor, reduced) {
             adjustment.mean_cofactor_m2 = Some(mean.cofactor_m2);
+            adjustment.mean_parts = Some(MeanParts::of(layout, of, &mean));
             mean.compare(layout, at, &mut adjustment.points);
         }
         let left = controls.as_ref().map(|controls| &controls.left);

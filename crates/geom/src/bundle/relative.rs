@@ -81,6 +81,17 @@ impl Mean {
         })
     }
 
+    /// Cofactors between the mean and a shared unknown, by its column.
+    pub(super) fn with_unknown(&self, column: usize) -> Vector3<f64> {
+        self.through.row(column).transpose() / self.count
+    }
+
+    /// Change of the mean with an error of each observed height, of either sign: one column per height.
+    pub(super) fn by_height(&self) -> Matrix3xX<f64> {
+        let moves = &self.weighted_moves + &self.weighted * &self.through;
+        moves.transpose() / self.count
+    }
+
     /// States the accuracy of all points that no profile records, relative to the mean.
     pub(super) fn compare<M: ExteriorOrientation>(
         &self,

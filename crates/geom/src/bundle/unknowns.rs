@@ -5,7 +5,7 @@ use std::{fmt, ops::Range};
 use nalgebra::{DVector, Vector3};
 
 use super::{CommonBus, Network, ORIENTATION_UNKNOWNS, Part, SharedRotation};
-use crate::pushbroom::OrientationCorrection;
+use crate::{boresight::BoresightAngles, pushbroom::OrientationCorrection};
 use areograph_base::units::METRES_PER_KM;
 
 /// An unknown that is shared by many observations.
@@ -215,9 +215,9 @@ impl Columns {
         columns.attitude_clock =
             clock.and_then(|clock| columns.add(Unknown::AttitudeClock, clock.sigma_s));
         let first = columns.len();
-        let boresight_rad = bus.map_or(0.0, |bus| bus.boresight_sigma_rad);
-        columns.boresight =
-            [0, 1].map(|axis| columns.add(Unknown::Boresight { axis }, boresight_rad));
+        if let Some(bus) = bus {
+            columns.add_boresight(&bus.boresight);
+        }
         let clock = columns.attitude_clock.map(|column| column..column + 1);
         let blocks = columns.images.iter().chain(&columns.profiles).cloned();
         let blocks = blocks
@@ -236,6 +236,27 @@ impl Columns {
             self.follows.push(None);
             self.unknowns.len() - 1
         })
+    }
+
+    /// Adds the boresight angles; the a priori value of the second follows the first by their covariance.
+    fn add_boresight(&mut self, prior: &BoresightAngles) {
+        let variances = &prior.covariance_rad2;
+        let first = self.add(Unknown::Boresight { axis: 0 }, variances[(0, 0)].sqrt());
+        let factor = if first.is_some() {
+            variances[(0, 1)] / variances[(0, 0)]
+        } else {
+            0.0
+        };
+        let left = variances[(1, 1)] - factor * variances[(0, 1)];
+        let second = self.add(Unknown::Boresight { axis: 1 }, left.sqrt());
+        if let Some(first) = first {
+            self.expected[first] = prior.angles_rad[0];
+        }
+        if let Some(second) = second {
+            self.expected[second] = prior.angles_rad[1] - factor * prior.angles_rad[0];
+            self.follows[second] = first.filter(|_| factor != 0.0).map(|of| (of, factor));
+        }
+        self.boresight = [first, second];
     }
 
     /// The shift of a profile with these columns follows the rotation of an image, where that is an unknown.
@@ -347,7 +368,10 @@ impl State {
                 .iter()
                 .map(|column| value(*column))
                 .collect(),
-            boresight_rad: columns.boresight.map(value),
+            boresight_rad: network.common_bus.as_ref().map_or([0.0; 2], |bus| {
+                let held: [f64; 2] = bus.boresight.angles_rad.into();
+                [0, 1].map(|axis| columns.boresight[axis].map_or(held[axis], |of| corrections[of]))
+            }),
             range_biases_m: columns
                 .of_profile
                 .iter()

@@ -11,7 +11,7 @@ use crate::ellipsoid::local_axes;
 /// Standard deviation of a shift in plan on an axis that all profiles share, metres: crossovers do not show it, and the scatter of
 /// shifts does not contain it. A choice, a quarter of the horizontal accuracy of MOLA (100 m, Neumann et al. 2001). Without it, errors of positions by 60
 /// profiles exceeded their stated standard deviations by up to a half.
-const COMMON_M: f64 = 25.0;
+pub(super) const COMMON_M: f64 = 25.0;
 
 /// Offsets of recorded profiles from their true positions in plan, with the covariance of their errors. By default, nothing is
 /// known of any.

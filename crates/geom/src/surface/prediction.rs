@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use super::{
     GRADIENT_STEP_M, LaserSurface, PlanShifts, SurfaceOptions,
     kriging::{Kriging, ProfileSums, Relation},
+    plan_shifts::COMMON_M,
     shot::PROFILE_PLAN_M,
 };
 use crate::blocked_cholesky::add_square;
@@ -31,6 +32,9 @@ pub struct SurfaceHeights {
     pub covariance_m2: DMatrix<f64>,
     /// Covariance without the effect of planimetric errors on a slope, m².
     pub without_plan_m2: DMatrix<f64>,
+    /// Effect of one standard deviation of the radial error of each profile, metres: one row per profile, one column per point.
+    /// Both covariances contain these errors.
+    pub radial_m: DMatrix<f64>,
     /// The body whose ellipsoid they refer to.
     pub body: Body,
     /// Planimetric information, where relief determines planimetry.
@@ -68,6 +72,8 @@ pub struct Relief {
     pub profiles: Vec<ProfileOnRelief>,
     /// Covariance of these shifts in east, north and height, m²: three rows per profile.
     pub covariance_m2: DMatrix<f64>,
+    /// The part of it that all profiles have in common, on each axis in plan, m².
+    pub common_plan_m2: f64,
 }
 
 /// Dependence of heights of the surface on the shift of one of its profiles.
@@ -114,6 +120,8 @@ struct Shifts {
     /// Covariance of the remaining shifts in plan, m², two rows per profile, and its lower triangular factor.
     plan_m2: DMatrix<f64>,
     plan_factor: DMatrix<f64>,
+    /// Variance on an axis in plan that all of them have in common, m²; 0 for independent shifts.
+    common_plan_m2: f64,
 }
 
 impl Shifts {
@@ -144,6 +152,7 @@ impl Shifts {
             radial_m: radial.map(|of| of * options.profile_sigma_m).collect(),
             plan_m2,
             plan_factor,
+            common_plan_m2: known.map_or(0.0, |_| COMMON_M.powi(2)),
             profiles,
         }
     }
@@ -185,6 +194,7 @@ impl Shifts {
                 })
                 .collect(),
             covariance_m2,
+            common_plan_m2: self.common_plan_m2,
         }
     }
 }
@@ -243,6 +253,7 @@ impl LaserSurface {
                 .map(|place| self.kriging.nearest_m(place))
                 .collect(),
             slopes: sighted.slopes,
+            radial_m: sighted.radial_m,
             covariance_m2,
         }
     }

@@ -14,6 +14,12 @@ pub(super) struct BoresightDocument<'a> {
     angles_rad: [f64; 2],
     #[schemars(transform = none_negative)]
     sigma_rad: [f64; 2],
+    /// Covariance of the angles, rad².
+    covariance_rad2: [[f64; 2]; 2],
+    prior: PriorDocument<'a>,
+    /// Statement of the observations of this site about the angles, without a priori values; omitted where an angle is held.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    information: Option<InformationDocument>,
     images: Vec<SpotsDocument<'a>>,
     /// Offset of each recorded profile from its adjusted position.
     profile_shifts: &'a [ProfileOffset],
@@ -23,6 +29,29 @@ pub(super) struct BoresightDocument<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(transform = at("/prefixItems/1", "minimum", 0))]
     farthest: Option<&'a (String, f64)>,
+}
+
+/// A priori values of the angles.
+#[derive(Serialize, JsonSchema)]
+struct PriorDocument<'a> {
+    angles_rad: [f64; 2],
+    #[schemars(transform = none_negative)]
+    sigma_rad: [f64; 2],
+    /// Sites of `adjustment.boresight` whose statements they contain.
+    sites: &'a [String],
+    /// Sites of that file that share an image or an orbit with this site, and are not used.
+    left_out: &'a [String],
+    /// Sites of that file that contradict the others, and are not used.
+    contradicting: &'a [String],
+}
+
+/// Normal equations of the two angles.
+#[derive(Serialize, JsonSchema)]
+struct InformationDocument {
+    /// Matrix, per rad²: first angle, both, second angle.
+    matrix: [f64; 3],
+    /// Right-hand side, per radian.
+    vector: [f64; 2],
 }
 
 #[derive(Serialize, JsonSchema)]
@@ -36,6 +65,8 @@ struct SpotsDocument<'a> {
     /// Image positions of footprints from the initial orientation minus positions from the laser mounting: along the
     /// track in lines, across the track in focal-plane pixels.
     footprints_off: &'a [Summary; 2],
+    /// Direction of the laser by the mounting, components in the camera.
+    beam: [f64; 3],
 }
 
 impl<'a> BoresightDocument<'a> {
@@ -45,10 +76,23 @@ impl<'a> BoresightDocument<'a> {
             spots: of.spots,
             line_time_s: of.line_time_s,
             footprints_off: &of.footprints_off,
+            beam: of.beam,
         };
         Self {
             angles_rad: found.angles_rad,
             sigma_rad: found.sigma_rad,
+            covariance_rad2: found.covariance_rad2.into(),
+            prior: PriorDocument {
+                angles_rad: found.prior.angles.angles_rad.into(),
+                sigma_rad: found.prior.angles.sigmas_rad(),
+                sites: &found.prior.sites,
+                left_out: &found.prior.left_out,
+                contradicting: &found.prior.contradicting,
+            },
+            information: found.information.map(|of| InformationDocument {
+                matrix: of.matrix_terms(),
+                vector: of.vector.into(),
+            }),
             images: found.images.iter().map(spots).collect(),
             profile_shifts: &found.profile_shifts,
             without: &found.without,

@@ -1,7 +1,7 @@
 //! Definitions of the numbers of the document.
 
 /// Definitions of the numbers, for readers of the file.
-pub(super) const DEFINITIONS: [(&str, &str); 16] = [
+pub(super) const DEFINITIONS: [(&str, &str); 17] = [
     (
         "before, after",
         "results with the orientation from the kernels (before) and with the adjusted orientation (after), for which \
@@ -83,6 +83,12 @@ pub(super) const DEFINITIONS: [(&str, &str); 16] = [
          relative_sigma_north_m and relative_sigma_up_m of ties.parquet",
     ),
     (
+        "mean_sigma_parts",
+        "mean_sigma_m by cause; squares of the parts add up to its squares. frame_m and boresight_m are errors that other sites have as \
+         well; profiles_m is shared by sites with the same profiles; all other parts belong to this site alone. Single tie points have \
+         further errors (relative_sigma_* of ties.parquet)",
+    ),
+    (
         "other_reading",
         "where a pair disagrees by more than 100 m along the flight: the mean position of the tie points in the other \
          of two readings (all images equally likely to be in error, or one offset of the attitude clock, \
@@ -92,7 +98,8 @@ pub(super) const DEFINITIONS: [(&str, &str); 16] = [
     (
         "boresight",
         "where adjustment.common_bus is yes: angles of the laser from the direction that the mounting and the altimeter file \
-         give (towards X of the bus, and perpendicular to X and the beam), the offset of each recorded profile from its \
+         give (towards X of the bus, and perpendicular to X and the beam), their a priori values (prior), what the observations of this site \
+         state without these (information: the input of areograph estimate-boresight), the offset of each recorded profile from its \
          adjusted position, and the unknown with the largest standardised residual of its a priori value",
     ),
     (

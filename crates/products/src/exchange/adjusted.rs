@@ -7,7 +7,7 @@ use nalgebra::Matrix3;
 use super::{
     gcp::{ControlMeasure, ControlPoint, write_gcp},
     lidar_data::{LidarPoint, ProfileShift, write_lidar_data},
-    points::{GroundEstimate, ImageMeasure},
+    points::{GroundEstimate, ImageMeasure, SharedSigmas},
 };
 use crate::{
     AdjustmentProducts, ImageProducts, SiteProducts,
@@ -61,8 +61,8 @@ pub(crate) static CONTROL: Declaration = Declaration {
             .collect();
         let points = control_points(of.site, geometric.ties, adjustment, &files);
         let some = !points.is_empty();
-        let shared_m = shared_sigma_m(adjustment);
-        some.then(|| write_gcp(path, of.site.config.body, shared_m, &points))
+        let shared = shared_sigmas(adjustment);
+        some.then(|| write_gcp(path, of.site.config.body, shared.as_ref(), &points))
             .transpose()
     }),
     uses: &[Use {
@@ -93,10 +93,18 @@ pub(super) fn adjusted(point: &CorrectedPoint) -> GroundEstimate {
     estimate(point.ground, point.covariance_m2)
 }
 
-/// Standard deviations of the error that all tie points share in east, north and height, metres.
-pub(super) fn shared_sigma_m(adjustment: &AdjustmentProducts) -> Option<[f64; 3]> {
-    let heights = adjustment.adjusted.heights.as_ref();
-    heights.map(|heights| heights.mean_sigma_m)
+/// The error that all tie points share.
+pub(super) fn shared_sigmas(adjustment: &AdjustmentProducts) -> Option<SharedSigmas> {
+    let heights = adjustment.adjusted.heights.as_ref()?;
+    let parts = heights.mean_sigma_parts.all();
+    let of_all_sites_m2 = |axis: usize| {
+        let elsewhere = parts.iter().filter(|of| of.of_all_sites);
+        elsewhere.map(|of| of.sigma_m[axis].powi(2)).sum::<f64>()
+    };
+    Some(SharedSigmas {
+        sigma_m: heights.mean_sigma_m,
+        of_all_sites_m: [0, 1, 2].map(|axis| of_all_sites_m2(axis).sqrt()),
+    })
 }
 
 /// A priori knowledge of the shift of each profile with a range, in order.

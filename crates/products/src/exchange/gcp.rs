@@ -17,7 +17,7 @@ use std::{fmt::Write as _, path::Path};
 
 use super::{
     DEGREE_DECIMALS, METRE_DECIMALS,
-    points::{GroundEstimate, ImageMeasure, above_zero, shared_in_words},
+    points::{GroundEstimate, ImageMeasure, SharedSigmas, above_zero, shared_in_words},
 };
 use crate::{error::ProductError, files::write_text};
 use areograph_base::{
@@ -55,7 +55,7 @@ pub struct ControlMeasure<'a> {
 
 /// Writes the points that were measured in any image to `path`, which must end in `.gcp`; returns their number.
 ///
-/// * `shared_sigma_m` – standard deviations of the error that all points share in east, north and height, metres
+/// * `shared` – the error that all points share
 ///
 /// # Errors
 /// [`Kind::Bug`](areograph_base::error::Kind::Bug) for values that the reader would reject or misread:
@@ -64,7 +64,7 @@ pub struct ControlMeasure<'a> {
 pub fn write_gcp(
     path: &Path,
     body: Body,
-    shared_sigma_m: Option<[f64; 3]>,
+    shared: Option<&SharedSigmas>,
     points: &[ControlPoint],
 ) -> Result<u64> {
     let map = body.map();
@@ -77,8 +77,8 @@ pub fn write_gcp(
         body.names().name,
         body.names().short_frame
     );
-    let _infallible = writeln!(text, "# {}", shared_in_words(shared_sigma_m));
-    if shared_sigma_m.is_some() {
+    let _infallible = writeln!(text, "# {}", shared_in_words(shared));
+    if shared.is_some() {
         text += "# after the identifier of a point: standard deviations along x, y, z without the shared error, metres\n";
     }
     let measured = points.iter().filter(|point| !point.measures.is_empty());

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Matrix3, Vector3};
 
 use super::{
-    adjusted::{adjusted, isis_name, shared_sigma_m, tie_sigmas_px},
+    adjusted::{adjusted, isis_name, shared_sigmas, tie_sigmas_px},
     binary_network::write_binary_network,
     bundleout::{ImageRow, PointRow, ResidualRow, write_images, write_points, write_residuals},
     control_network::{
@@ -219,7 +219,7 @@ impl<'a> Joined<'a> {
         let description = format!(
             "adjusted tie points of areograph; {}; {}",
             self.site.config.body.names().short_frame,
-            shared_in_words(shared_sigma_m(self.adjustment)),
+            shared_in_words(shared_sigmas(self.adjustment).as_ref()),
         );
         ControlNetwork {
             id: &self.site.config.site,

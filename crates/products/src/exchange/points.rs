@@ -51,21 +51,40 @@ impl GroundEstimate {
     }
 }
 
-/// The error that tie points share, for the comments of formats that state each point alone; standard deviations towards
-/// east, north and up, metres.
-pub(super) fn shared_in_words(sigma_m: Option<[f64; 3]>) -> String {
-    let size = sigma_m.map_or_else(
+/// The error that tie points of a site share: standard deviations in east, north and height, metres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SharedSigmas {
+    /// Of the error.
+    pub sigma_m: [f64; 3],
+    /// Of its part that the points of other sites have as well.
+    pub of_all_sites_m: [f64; 3],
+}
+
+/// The error that tie points share, for the comments of formats that state each point alone.
+pub(super) fn shared_in_words(shared: Option<&SharedSigmas>) -> String {
+    let size = shared.map_or_else(
         || "the error of the a priori orientations".to_owned(),
-        |[east_m, north_m, up_m]| {
+        |shared| {
+            let [east_m, north_m, up_m] = shared.sigma_m;
             format!(
                 "an error with standard deviations of {east_m:.1} m east, {north_m:.1} m north and {up_m:.1} m up"
             )
         },
     );
+    let elsewhere = shared.filter(|of| of.of_all_sites_m.iter().any(|of_m| *of_m >= SAID_M));
+    let elsewhere = elsewhere.map_or_else(String::new, |shared| {
+        let [east_m, north_m, up_m] = shared.of_all_sites_m;
+        format!(
+            "; other sites share a part of it, {east_m:.1} m east, {north_m:.1} m north and {up_m:.1} m up"
+        )
+    });
     format!(
-        "all points share {size}; the standard deviations of the points contain this error, which does not average out"
+        "all points share {size}{elsewhere}; the standard deviations of the points contain this error, which does not average out"
     )
 }
+
+/// A smaller part is 0 in the comments, metres.
+const SAID_M: f64 = 0.05;
 
 /// Rejects a value that is not above 0.
 pub(super) fn above_zero(what: &str, value: f64) -> Result<(), ProductError> {

@@ -2,7 +2,7 @@
 
 use super::{
     super::{
-        html::{Cell, Column, Markup, Table, html, paragraph},
+        html::{Cell, Column, Markup, Table, counted, html, paragraph},
         plots::label,
     },
     relief::profiles,
@@ -36,12 +36,27 @@ fn words(found: &BoresightSummary) -> Markup {
             label(*sigmas, 1)
         )
     });
+    let prior = &found.prior.angles;
+    let before = |axis: usize| {
+        let [value, sigma] = [prior.angles_rad[axis], prior.sigmas_rad()[axis]]
+            .map(|radians| label(MRAD_PER_RADIAN * radians, 3));
+        format!("{value} ± {sigma} mrad")
+    };
+    let by = match found.prior.sites.len() {
+        0 => String::new(),
+        count => format!(
+            ", by {} (adjustment.boresight)",
+            counted(count, "other site")
+        ),
+    };
     paragraph(&format!(
         "Camera and laser share a bus: in a simultaneous image, the mounting determines the spot of each shot, \
          independently of the attitude (adjustment.common_bus). The laser direction differs from the nominal \
-         direction by {} towards X and {} towards Y of the bus.{}",
+         direction by {} towards X and {} towards Y of the bus; a priori {} and {}{by}.{}",
         angle(0),
         angle(1),
+        before(0),
+        before(1),
         farthest.unwrap_or_default()
     ))
 }

@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     attitude_clock::prior_sigmas,
-    common_bus::{self, BoresightSummary},
+    boresight::BoresightSummary,
+    common_bus,
     height_summary::{self, HeightSummary},
     input::AdjustImage,
     network::Assembled,

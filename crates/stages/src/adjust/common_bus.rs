@@ -3,9 +3,10 @@
 use std::collections::BTreeMap;
 
 use nalgebra::{Matrix3, Vector2, Vector3};
-use serde::{Deserialize, Serialize};
 
 use super::{
+    boresight::{BoresightSummary, SpotsOfImage},
+    boresight_prior::prior_of,
     error::AdjustError,
     input::{AdjustImage, LaserShot, LaserShots, ShotRange},
     network::{Assembled, projector},
@@ -14,6 +15,7 @@ use super::{
 };
 use areograph_config::AdjustmentConfig;
 use areograph_geom::{
+    boresight::{BoresightAngles, BoresightInformation},
     bundle::{
         AdjustedBus, Adjustment, CommonBus, Estimate, RecordedProfile, Residual, SharedRotation,
         Spot, Unknown, View,
@@ -34,39 +36,6 @@ const SPOT_SIGMA_PX: f64 = 0.5;
 const ATTITUDE_IN_FILES: [f64; 2] = [0.25, 0.25];
 /// Index of the constant rotation about the camera's x axis, which moves an image across its track.
 const ROLL: usize = 9;
-
-/// Boresight of a laser on the bus of the cameras.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct BoresightSummary {
-    /// Two angles by which the boresight differs from the laser's file and the frame kernels, radians: towards X of the
-    /// bus, and towards the axis that completes the right-handed set.
-    pub angles_rad: [f64; 2],
-    /// Standard deviations of these, radians.
-    pub sigma_rad: [f64; 2],
-    /// Images with spots.
-    pub images: Vec<SpotsOfImage>,
-    /// Offset of each of their profiles as recorded.
-    pub profile_shifts: Vec<ProfileOffset>,
-    /// Images without a simultaneous profile.
-    pub without: Vec<String>,
-    /// The unknown of laser, profiles and line times that is farthest from its a priori value, and its distance in
-    /// standard deviations of the contradiction; `None` where nothing tests them.
-    pub farthest: Option<(String, f64)>,
-}
-
-/// Spots in one image.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct SpotsOfImage {
-    /// Identifier.
-    pub image: String,
-    /// Spots.
-    pub spots: usize,
-    /// Delay of its lines against the shots with its standard deviation, seconds, where it is an unknown.
-    pub line_time_s: Option<(f64, f64)>,
-    /// Footprints in the initial orientation minus the laser's position from the mounting: along the track in lines,
-    /// across it in focal-plane pixels.
-    pub footprints_off: [Summary; 2],
-}
 
 /// Adds the spots of all shots with a range to the network, or returns the reason if none exist.
 pub(super) fn add_spots<M: ExteriorOrientation>(
@@ -121,13 +90,15 @@ pub(super) fn add_spots<M: ExteriorOrientation>(
             shared,
         }
     });
+    let boresight = prior_of(images, shots, config)?;
     assembled.network.common_bus = Some(CommonBus {
-        boresight_sigma_rad: config.boresight_sigma_rad,
+        boresight: boresight.angles,
         line_time_sigma_s: config.boresight_line_time_sigma_s.unwrap_or(f64::INFINITY),
         profiles: profiles.collect(),
         recorded,
         spots,
     });
+    assembled.boresight = Some(boresight);
     Ok(Ok(()))
 }
 
@@ -245,14 +216,24 @@ pub(super) fn summarise<M: ExteriorOrientation>(
             line_time_s: bus.line_times_s[index]
                 .map(|found| (found.value, found.root_cofactor * root)),
             footprints_off: [0, 1].map(|axis| Summary::of(&of_axis(axis))),
+            beam: image.beam().map_or([0.0; 3], Into::into),
         }
     };
     let all = images.iter().enumerate().map(of_image);
     let (with, without): (Vec<_>, Vec<_>) = all.partition(|of| of.spots > 0);
     let profiles = assembled.profiles.iter().zip(&bus.profile_shifts_m);
+    let angles_rad = bus.boresight_rad.map(|found| found.value);
+    let prior = assembled.boresight.as_ref()?;
+    let adjusted = BoresightAngles {
+        angles_rad: angles_rad.into(),
+        covariance_rad2: bus.boresight_cofactors * variance_factor,
+    };
     Some(BoresightSummary {
-        angles_rad: bus.boresight_rad.map(|found| found.value),
-        sigma_rad: bus.boresight_rad.map(|found| found.root_cofactor * root),
+        angles_rad,
+        sigma_rad: adjusted.sigmas_rad(),
+        covariance_rad2: adjusted.covariance_rad2,
+        prior: prior.clone(),
+        information: BoresightInformation::of(&adjusted, &prior.angles, variance_factor),
         images: with,
         profile_shifts: profiles
             .map(|(profile, shift)| ProfileOffset {

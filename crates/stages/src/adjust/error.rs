@@ -71,6 +71,18 @@ pub enum AdjustError {
         /// Reason.
         unseen: Unseen,
     },
+    /// Statements about the laser in other cameras, or with a different mounting.
+    #[error(
+        "adjustment.boresight does not apply to image {image}: its camera and laser are mounted differently from {known}, to \
+         which the file refers"
+    )]
+    #[cause(Configuration: "estimate the boresight from sites with this camera, laser and frame kernels, or remove adjustment.boresight")]
+    OtherMounting {
+        /// Identifier of the image.
+        image: String,
+        /// Cameras of the file.
+        known: String,
+    },
     /// Initial values that the observations contradict.
     #[error(
         "{what} contradicts the rest of the network: standardised residual {standardised:.1}; expected at most \

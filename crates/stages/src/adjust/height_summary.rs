@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     components::variance_factor,
+    mean_parts::MeanSigmaParts,
     network::Assembled,
     points::{RejectedPoint, RejectionReason},
 };
@@ -50,6 +51,8 @@ pub struct HeightSummary {
     /// in error.
     #[schemars(transform = none_negative)]
     pub mean_sigma_m: [f64; 3],
+    /// Parts of `mean_sigma_m` by cause.
+    pub mean_sigma_parts: MeanSigmaParts,
 }
 
 impl HeightSummary {
@@ -88,6 +91,10 @@ pub(super) fn heights<M>(
         .collect();
     let factor = variance_factor(assembled, adjustment);
     let mean_sigma_m = datum_sigma_m(adjustment, factor)?;
+    let parts = adjustment.mean_parts.as_ref()?;
+    let to_local = local_axes(&middle_m(adjustment));
+    let mean_m2 = adjustment.mean_cofactor_m2.as_ref()?;
+    let moved_m = moved_by_outliers_m(adjustment);
     let compared = &adjustment.compared;
     let for_height = |of: &&RejectedPoint| matches!(of.reason, RejectionReason::Height { .. });
     Some(HeightSummary {
@@ -101,6 +108,7 @@ pub(super) fn heights<M>(
         beyond_limit: beyond_limit(compared),
         rejected: assembled.rejected.iter().filter(for_height).count(),
         mean_sigma_m,
+        mean_sigma_parts: MeanSigmaParts::of(mean_m2, parts, &to_local, factor, moved_m),
     })
 }
 
@@ -108,23 +116,31 @@ pub(super) fn heights<M>(
 /// their mean and, upwards, the shift of the mean by points beyond the limit.
 pub(super) fn datum_sigma_m(adjustment: &Adjustment, variance_factor: f64) -> Option<[f64; 3]> {
     let [east_m, north_m, up_m] = mean_sigma_m(adjustment, variance_factor)?;
+    Some([east_m, north_m, up_m.hypot(moved_by_outliers_m(adjustment))])
+}
+
+/// Shift of the mean height by points beyond the limit, metres.
+fn moved_by_outliers_m(adjustment: &Adjustment) -> f64 {
     let compared = &adjustment.compared;
     let moved_m = compared
         .iter()
         .filter(|of| is_beyond(of))
         .map(|of| of.above_m);
-    let moved_m = moved_m.sum::<f64>() / compared.len().max(1) as f64;
-    Some([east_m, north_m, up_m.hypot(moved_m)])
+    moved_m.sum::<f64>() / compared.len().max(1) as f64
 }
 
 /// Standard deviations of the mean of the points with an observed height in east, north and height, metres.
 pub(super) fn mean_sigma_m(adjustment: &Adjustment, variance_factor: f64) -> Option<[f64; 3]> {
-    let points = adjustment.heights.iter();
-    let points = points.filter_map(|height| adjustment.points[height.point].as_ref().ok());
-    let middle_m: Vector3<f64> = points.map(|point| point.ground_m).sum();
-    let to_local = local_axes(&middle_m);
+    let to_local = local_axes(&middle_m(adjustment));
     let mean_m2 = to_local * adjustment.mean_cofactor_m2? * to_local.transpose();
     Some([0, 1, 2].map(|axis| (variance_factor * mean_m2[(axis, axis)]).sqrt()))
+}
+
+/// Direction of the mean of the points with an observed height.
+fn middle_m(adjustment: &Adjustment) -> Vector3<f64> {
+    let points = adjustment.heights.iter();
+    let points = points.filter_map(|height| adjustment.points[height.point].as_ref().ok());
+    points.map(|point| point.ground_m).sum()
 }
 
 /// Heights beyond the limit of the test.

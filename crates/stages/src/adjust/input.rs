@@ -32,6 +32,13 @@ pub struct AdjustImage<M> {
     pub laser_axes: Option<Matrix3<f64>>,
 }
 
+impl<M> AdjustImage<M> {
+    /// Direction of the beam of a laser on the same bus, camera components.
+    pub(super) fn beam(&self) -> Option<Vector3<f64>> {
+        Some(self.laser_axes?.column(2).into_owned())
+    }
+}
+
 /// Standard deviations of an image's unknowns from one for positions and one for rotations.
 ///
 /// All powers of `t`, in units of half the image, get the same standard deviation.

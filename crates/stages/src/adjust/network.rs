@@ -6,6 +6,7 @@ use nalgebra::{Vector2, Vector3};
 
 use super::{
     attitude_clock::by_attitude_clock,
+    boresight_prior::BoresightPrior,
     error::AdjustError,
     input::{AdjustImage, LaserShots},
     line_times::delay_sigma_s,
@@ -57,6 +58,8 @@ pub(super) struct Assembled<M> {
     pub(super) tie_scatter_px: f64,
     /// Reason why the laser's position in images is not an observation although it was requested.
     pub(super) no_spots: Option<String>,
+    /// A priori boresight of the laser, where its position in images is an observation.
+    pub(super) boresight: Option<BoresightPrior>,
 }
 
 pub(super) fn assemble<'a, M: ExteriorOrientation>(
@@ -81,6 +84,7 @@ pub(super) fn assemble<'a, M: ExteriorOrientation>(
         unseen_delay_s: delay_sigma_s(config),
         tie_scatter_px: 0.0,
         no_spots: None,
+        boresight: None,
     };
     assembled.add_shots(shots, config)?;
     assembled.mola = footprints_in_images(images, shots, config)?;

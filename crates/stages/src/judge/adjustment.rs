@@ -357,7 +357,8 @@ impl AdjustmentEvidence<'_> {
             );
         }
         remarks.extend(self.cause_of_disagreement(evidence));
-        if matches!(self.adjusted.boresight, Some(Ok(_))) {
+        if let Some(Ok(found)) = &self.adjusted.boresight {
+            remarks.extend(found.prior.remark());
             remarks.push(
                 "across-track positions depend on adjustment.common_bus, which assumes that footprints do not contain \
                  the attitude error of these kernels: footprints computed with the same attitude would agree with the \

@@ -224,6 +224,7 @@ impl View {
                 jitter_m: None,
                 drift_m: None,
                 shared_sigma_m: None,
+                image_sigma_m: None,
                 look: OrthoimageLook::of(&brightness),
             },
             brightness,

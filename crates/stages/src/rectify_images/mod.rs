@@ -198,9 +198,12 @@ pub struct OrthoimageAccount {
     /// Standard deviation due to drift, metres: errors of the orientation that change along the image, by the adjustment, or by
     /// the usual errors of kernels; `None` where neither is known.
     pub drift_m: Option<f64>,
-    /// Standard deviations of the shared error, east and north, metres: of all images by an adjustment with heights, or of this
-    /// image by the usual errors of kernels; `None` for an adjustment without heights, and for support data.
+    /// Standard deviations of the error that all adjusted images share, east and north, metres; `None` without an adjustment of
+    /// heights.
     pub shared_sigma_m: Option<[f64; 2]>,
+    /// Standard deviations of the error that all places of this image share, and no other image, east and north, metres, by the
+    /// usual errors of kernels; `None` after an adjustment, and for support data.
+    pub image_sigma_m: Option<[f64; 2]>,
     /// The orthoimage in larger cells, for display.
     pub look: OrthoimageLook,
 }
@@ -232,7 +235,7 @@ enum RectifyError {
 
 impl Stage for RectifyImages<'_> {
     const NAME: &'static str = "rectify_images";
-    const METHOD: u32 = 4;
+    const METHOD: u32 = 5;
     type Output = Vec<Orthoimage>;
     stage_inputs!(fingerprint);
 
@@ -300,6 +303,7 @@ impl Stage for RectifyImages<'_> {
             account.interpolated = interpolated(&orthoimage.sigmas_m, surface);
             if let Some(adjusted) = adjusted {
                 account.shared_sigma_m = shared_sigma_m(adjusted);
+                account.image_sigma_m = None;
             }
             made.push(orthoimage);
         }
@@ -381,7 +385,8 @@ fn rectified(
         sigma_m: (square_m2 / known.count().max(1) as f64).sqrt(),
         jitter_m,
         drift_m,
-        shared_sigma_m: plan.map(|plan| plan.shared_m),
+        shared_sigma_m: None,
+        image_sigma_m: plan.map(|plan| plan.shared_m),
         look: OrthoimageLook::of(&brightness.cells),
     };
     Ok(Some(Orthoimage {

@@ -55,6 +55,7 @@ pub(crate) fn orthoimage(
             jitter_m: None,
             drift_m: None,
             shared_sigma_m: None,
+            image_sigma_m: None,
         },
         brightness,
         sigmas_m: Vec::new(),
