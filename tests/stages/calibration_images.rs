@@ -5,6 +5,7 @@
     clippy::disallowed_methods,
     clippy::unwrap_used,
     clippy::panic,
+    clippy::print_stdout,
     reason = "tests work in temporary folders and may fail loudly"
 )]
 
@@ -119,7 +120,7 @@ fn calibrated(seed: u64, orbit_errors: f64) -> (Vec<[f64; 2]>, Vec<String>) {
         let file = scene.join(format!("{orbit}.toml"));
         let config = CalibrationConfig::load(&file).unwrap().config;
         let run = run_into(Task::Calibration(&config), &scene.join("out"), false).unwrap();
-        reasons = run.manifest().unwrap().verdict.reasons.clone();
+        reasons.clone_from(&run.manifest().unwrap().verdict.reasons);
         let of = |support: &dyn Fn(&str) -> PathBuf| {
             plane_and_height_m(&errors_m(&truth, orbit, support))
         };

@@ -84,7 +84,7 @@ mod tests {
         // A faint chequerboard, of half the last step, disappears; a strong one stays.
         let board = |dn: u8| -> Vec<u8> {
             let at = |at: usize| {
-                if (at / 16 + at % 16) % 2 == 0 {
+                if (at / 16 + at % 16).is_multiple_of(2) {
                     120 + dn
                 } else {
                     120 - dn

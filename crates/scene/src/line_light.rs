@@ -14,7 +14,7 @@ const SUN: [f64; 3] = [-0.75, 0.25, 0.61];
 const LOW_SUN: [f64; 3] = [-0.85, 0.35, 0.36];
 /// Part of the light that comes from the sky and not from the Sun: a choice.
 const SKY: f64 = 0.1;
-/// Weight of the lunar part of the reflection, the rest of which follows Lambert: a choice near those of McEwen 1991 for these angles.
+/// Weight of the lunar part of the reflection, the rest of which follows Lambert: a choice near those of `McEwen` 1991 for these angles.
 const LUNAR: f64 = 0.55;
 /// Distances towards the Sun at which the ground may cast a shadow, metres: the finest relief has 25 m.
 const CASTS_M: [f64; 5] = [25.0, 50.0, 100.0, 200.0, 400.0];
