@@ -18,6 +18,8 @@ use crate::{
 /// state what its own observations show of the angles, without a priori values; these statements are added, and the a priori
 /// values enter once. Sites that share an image or an orbit with an earlier one, invalid sites, and sites that contradict the others
 /// are not used. If the statements scatter more than their standard deviations, those of the result increase by the same factor.
+/// Orientations and profile positions of different sites are assumed to be in error independently; an error common to all sites is
+/// not included.
 ///
 /// Examples:
 ///   areograph estimate-boresight products

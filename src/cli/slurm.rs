@@ -8,6 +8,7 @@ use std::{
     cell::Cell,
     collections::{BTreeMap, BTreeSet},
     fs,
+    os::unix::process::CommandExt as _,
     path::{Path, PathBuf},
     process::Command,
     sync::atomic::{AtomicBool, Ordering},
@@ -94,6 +95,8 @@ pub(super) struct Cluster<'a> {
     resources: Resources<'a>,
     /// Arrays submitted so far: the names of their files differ.
     submitted: Cell<u32>,
+    /// Whether it refused work that was submitted again: it gets no more.
+    refused: Cell<bool>,
 }
 
 impl<'a> Cluster<'a> {
@@ -115,6 +118,7 @@ impl<'a> Cluster<'a> {
             folder: out.join(TASKS),
             resources,
             submitted: Cell::new(0),
+            refused: Cell::new(false),
         };
         if let Ok(job) = fs::read_to_string(cluster.folder.join(JOB)) {
             cluster.cancel(job.trim());
@@ -142,14 +146,15 @@ impl<'a> Cluster<'a> {
         Ok(())
     }
 
-    /// Submits tasks and waits for them; returns the results by the number of their task. Lost tasks have none.
+    /// Submits tasks and waits for them; returns the results by the number of their task. Lost tasks have none. From the second
+    /// attempt on, tasks that the cluster refuses have none either, as when no node has twice the memory; nothing is submitted then.
     ///
     /// * `attempt` – from 1: each doubles the memory
     /// * `read` – the result of a task from the content of its file; `None` for the result of another task
     /// * `heard` – receives the results so far
     ///
     /// # Errors
-    /// A cluster that refuses the job or does not answer; interruption. The job is then cancelled.
+    /// A cluster that refuses the job at the first attempt or does not answer; interruption. The job is then cancelled.
     pub(super) fn attempt<T: Serialize, R>(
         &self,
         attempt: u32,
@@ -160,8 +165,20 @@ impl<'a> Cluster<'a> {
     ) -> Result<BTreeMap<usize, R>> {
         let mut results = BTreeMap::new();
         for (array, tasks) in tasks.chunks(ARRAY_MAX).enumerate() {
+            if self.refused.get() {
+                break;
+            }
             let files = self.write(tasks)?;
-            let job = self.submit(attempt, tasks.len())?;
+            let job = match self.submit(attempt, tasks.len()) {
+                Ok(job) => job,
+                Err(failure) if attempt > 1 => {
+                    Stopped::check(stop)?;
+                    tracing::warn!("tasks that were lost cannot be submitted again: {failure}");
+                    self.refused.set(true);
+                    break;
+                }
+                Err(failure) => return Err(failure),
+            };
             let waited = Self::wait(&job, tasks.len(), stop, |number| {
                 let place = array * ARRAY_MAX + number;
                 if !results.contains_key(&place)
@@ -238,7 +255,11 @@ impl<'a> Cluster<'a> {
         let (folder, array) = (self.folder.display(), self.submitted.get());
         let threads = of.threads;
         let mut sbatch = Command::new("sbatch");
+        // A signal of the terminal does not reach it: the job must not exist without its number here.
+        sbatch.process_group(0);
+        // The last of equal options counts: the user's are first.
         sbatch
+            .args(of.options)
             .arg("--parsable")
             .arg(format!("--job-name={}", self.job_name()))
             .arg(format!("--array=0-{}{limit}", tasks - 1))
@@ -246,7 +267,6 @@ impl<'a> Cluster<'a> {
             .arg(format!("--time={}", of.minutes))
             .args(threads.map(|threads| format!("--cpus-per-task={threads}")))
             .arg(format!("--output={folder}/{array}-%a.log"))
-            .args(of.options)
             .arg(format!(
                 "--wrap=exec {} {} {}\"$SLURM_ARRAY_TASK_ID\".json",
                 quoted(&program),
@@ -258,7 +278,10 @@ impl<'a> Cluster<'a> {
         if !is_job(job) {
             return Err(SlurmError::NoJob(answer).into());
         }
-        atomic::write(&self.folder.join(JOB), job.as_bytes())?;
+        if let Err(failure) = atomic::write(&self.folder.join(JOB), job.as_bytes()) {
+            self.cancel(job);
+            return Err(failure);
+        }
         Ok(job.to_owned())
     }
 
@@ -342,6 +365,7 @@ impl<'a> Cluster<'a> {
     fn cancel(&self, job: &str) {
         // The number of a job alone may be that of somebody else, on another cluster or after a restart.
         let mut scancel = Command::new("scancel");
+        scancel.arg("--me");
         scancel.arg(format!("--name={}", self.job_name())).arg(job);
         if !is_job(job) || answer_of("scancel", &mut scancel).is_err() {
             return;
@@ -370,8 +394,11 @@ pub(super) fn carry_out<T: DeserializeOwned, R: Serialize>(
     let signals = Signals::heard()?;
     let result = work(task, signals.stop())?;
     let path = file.with_extension(RESULT);
-    let text = serde_json::to_vec(&result).map_err(NoTask).in_file(&path)?;
-    atomic::write(&path, &text)
+    let text = serde_json::to_vec(&result).map_err(|error| IoError {
+        action: "write",
+        source: error.into(),
+    });
+    atomic::write(&path, &text.in_file(&path)?)
 }
 
 /// Sleeps until the next question, or until the command is stopped.
@@ -393,7 +420,10 @@ fn answer_of(program: &'static str, command: &mut Command) -> Result<String> {
         .output()
         .map_err(|source| SlurmError::NoProgram { program, source })?;
     if !output.status.success() {
-        let text = String::from_utf8_lossy(&output.stderr).trim().to_owned();
+        let text = match String::from_utf8_lossy(&output.stderr).trim() {
+            "" => output.status.to_string(),
+            text => text.to_owned(),
+        };
         return Err(SlurmError::Refused { program, text }.into());
     }
     Ok(String::from_utf8_lossy(&output.stdout).into_owned())

@@ -1,6 +1,9 @@
 //! Boresight of the laser by the statements of published sites.
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+};
 
 use serde_json::{Value, json};
 
@@ -11,7 +14,7 @@ use crate::{
     error::{Cause, Kind, Result},
     geom::boresight::{PooledBoresight, pooled},
     products::{PageData, SiteProducts},
-    stages::adjust::{BoresightSummary, orbit_of},
+    stages::adjust::BoresightSummary,
     store::published::{read_published_by_this_version, still_published},
 };
 
@@ -74,11 +77,16 @@ impl EstimatedBoresight {
             let [value, sigma] = [angles.angles_rad[axis], sigmas_rad[axis]].map(|of| 1e3 * of);
             format!("{value:+.3} ± {sigma:.3} mrad towards {name}")
         };
-        let mut sentences = vec![format!(
-            "Boresight of the laser by {sites}: {}, {} of the bus.",
-            axis(0, "X"),
-            axis(1, "Y")
-        )];
+        let mut sentences = vec![
+            format!(
+                "Boresight of the laser by {sites}: {}, {} of the bus.",
+                axis(0, "X"),
+                axis(1, "Y")
+            ),
+            "Orientations and profile positions of different sites are assumed to be in error independently; an error common to all \
+             sites (alignment of the cameras, frame of the laser) is not included."
+                .to_owned(),
+        ];
         if self.pooled.freedom > 0.0 {
             let effect = if self.pooled.scatter > 1.0 {
                 "the standard deviations contain this factor"
@@ -247,17 +255,13 @@ fn stated(site: &str, products: &SiteProducts<'_>) -> Stated {
     let information = found
         .information
         .ok_or("its boresight angles are held by boresight_sigma_arcsec = 0")?;
-    let profiles = found.profile_shifts.iter();
+    // All of them: tie points and surface are observations too.
+    let images = products.images.iter();
+    let orbits: BTreeSet<u32> = products.profiles.iter().map(|of| of.orbit).collect();
     let of_site = BoresightOfSite {
         site: site.to_owned(),
-        images: found
-            .images
-            .iter()
-            .map(|image| image.image.clone())
-            .collect(),
-        orbits: profiles
-            .map(|profile| orbit_of(&profile.profile).to_owned())
-            .collect(),
+        images: images.map(|image| image.times.id.clone()).collect(),
+        orbits: orbits.iter().map(u32::to_string).collect(),
         matrix: information.matrix_terms(),
         vector: information.vector.into(),
     };

@@ -174,7 +174,7 @@ fn an_interrupted_check_cancels_its_tasks_and_goes_on_later() {
     kill_process(pid, Signal::INT).unwrap();
     assert_eq!(child.wait().unwrap().code(), Some(130));
     let cancelled = fs::read_to_string(slurm.join("cancelled")).unwrap();
-    assert_eq!(cancelled, "--name=areograph-archive 1\n");
+    assert_eq!(cancelled, "--me --name=areograph-archive 1\n");
     assert!(!folder.path().join("far/manifest.json").exists());
     assert_eq!(ended(far(&archive, folder.path(), &slurm)).0, 5);
     let one = products(&ARCHIVE.path().join("one"));
@@ -186,7 +186,8 @@ fn an_interrupted_check_cancels_its_tasks_and_goes_on_later() {
 fn a_task_checks_the_file_of_the_command_only() {
     let archive = ARCHIVE.path().join("archive");
     let out = tempfile::tempdir().unwrap();
-    let path = archive.join("pedr/ap10001l.b");
+    let path = out.path().join("ap10001l.b");
+    fs::copy(archive.join("pedr/ap10001l.b"), &path).unwrap();
     let identity = Identity::of(&fs::metadata(&path).unwrap());
     let task = |identity: Identity| ArchiveTask {
         folder: out.path().to_owned(),
@@ -216,9 +217,10 @@ fn a_task_checks_the_file_of_the_command_only() {
     };
     assert_eq!(task(elsewhere).run(&stop).unwrap(), 1);
     assert_eq!(stored(), 1);
-    // It is found again, and is not the result of the file as this computer sees it.
-    stop.store(true, std::sync::atomic::Ordering::Relaxed);
-    assert!(task(identity).run(&stop).is_err());
+    // Every computer finds it again: the file itself is no longer read. It is not the result of another file.
+    fs::remove_file(&path).unwrap();
+    assert_eq!(task(identity).run(&stop).unwrap(), 1);
+    assert_eq!(task(other).run(&stop).unwrap(), 0);
 }
 
 #[test]
@@ -226,13 +228,28 @@ fn without_results_of_tasks_the_command_checks_the_files() {
     if !long_test("without_results_of_tasks_the_command_checks_the_files") {
         return;
     }
+    let told = check_without_results(r#"echo x >>"$state/jobs"; echo 7"#, 3);
+    assert!(!told.contains("cannot be submitted again"), "{told}");
+    // No node has twice the memory.
+    let refusal = r#"echo x >>"$state/jobs"
+[ "$(wc -l <"$state/jobs")" = 1 ] || { echo 'sbatch: error: no such node' >&2; exit 1; }
+echo 7"#;
+    let told = check_without_results(refusal, 2);
+    assert!(
+        told.contains("cannot be submitted again") && told.contains("no such node"),
+        "{told}"
+    );
+}
+
+/// Standard error of a check whose tasks never run, with this sbatch, which is called `calls` times.
+fn check_without_results(sbatch: &str, calls: usize) -> String {
     let archive = ARCHIVE.path().join("archive");
     let folder = tempfile::tempdir().unwrap();
     let slurm = folder.path().join("cluster");
     write_programs(
         &slurm,
         &[
-            ("sbatch", r#"echo x >>"$state/jobs"; echo 7"#),
+            ("sbatch", sbatch),
             ("squeue", "exit 0"),
             ("scancel", "exit 0"),
         ],
@@ -250,7 +267,8 @@ fn without_results_of_tasks_the_command_checks_the_files() {
         "{told}"
     );
     let jobs = fs::read_to_string(slurm.join("jobs")).unwrap();
-    assert_eq!(jobs.lines().count(), 3);
+    assert_eq!(jobs.lines().count(), calls);
     let one = products(&ARCHIVE.path().join("one"));
     assert_eq!(products(&folder.path().join("far")), one);
+    told
 }

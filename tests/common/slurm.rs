@@ -56,7 +56,8 @@ exit 0"#,
         (
             "scancel",
             r#"echo "$*" >>"$state/cancelled"
-while read -r task process; do kill "$process" 2>/dev/null; done <"$state/tasks-$2"
+for job; do :; done
+while read -r task process; do kill "$process" 2>/dev/null; done <"$state/tasks-$job"
 exit 0"#,
         ),
     ];

@@ -11,7 +11,7 @@ use crate::common;
 use std::{
     fs,
     path::Path,
-    process::{Child, Command},
+    process::Child,
     thread,
     time::{Duration, Instant},
 };
@@ -21,18 +21,28 @@ use common::{
     mission::{areograph, products, succeed},
     slurm::virtual_cluster,
 };
+use rustix::process::{Pid, Signal, kill_process};
 
 /// Pairs and single images of the campaign, and daemons that are killed while it runs.
 const CAMPAIGN: [&str; 4] = ["--pairs", "30", "--singles", "20"];
-const KILLED: [&str; 5] = [
-    "slurmd -N n2",
-    "slurmctld",
-    "slurmd -N n2",
-    "slurmctld",
-    "slurmd -N n3",
-];
+const KILLED: [&str; 5] = ["n2", "slurmctld", "n2", "slurmctld", "n3"];
 /// The campaign takes about a minute; a task that Slurm holds delays it by minutes.
 const LONGEST: Duration = Duration::from_mins(20);
+
+/// Kills a daemon of the virtual cluster in this folder, and waits for its end.
+pub(crate) fn kill_daemon(cluster: &Path, name: &str) {
+    let number = fs::read_to_string(cluster.join(format!("run/{name}.pid"))).unwrap();
+    let number: i32 = number.trim().parse().unwrap();
+    let command_line = || fs::read(format!("/proc/{number}/cmdline")).unwrap_or_default();
+    let is_own = String::from_utf8_lossy(&command_line()).contains(cluster.to_str().unwrap());
+    assert!(is_own, "{name} does not run");
+    kill_process(Pid::from_raw(number).unwrap(), Signal::KILL).unwrap();
+    let begun = Instant::now();
+    while !command_line().is_empty() {
+        assert!(begun.elapsed() < Duration::from_secs(10), "{name}");
+        thread::sleep(Duration::from_millis(10));
+    }
+}
 
 /// Waits for a campaign to end.
 fn ended(campaign: &mut Child) -> Option<i32> {
@@ -77,7 +87,7 @@ fn killed_daemons_of_a_cluster_change_no_product() {
     let mut campaign = run("far");
     for daemon in KILLED {
         thread::sleep(Duration::from_secs(4));
-        let _ = Command::new("pkill").args(["-9", "-f", daemon]).status();
+        kill_daemon(&path("cluster"), daemon);
         thread::sleep(Duration::from_secs(4));
         virtual_cluster("start", &path("cluster"));
     }

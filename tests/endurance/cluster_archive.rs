@@ -21,16 +21,13 @@ use common::{
     slurm::virtual_cluster,
 };
 
+use crate::cluster::kill_daemon;
+
 /// Size of the archive: 31 files.
 const ARCHIVE: [&str; 2] = ["--gb", "1"];
 /// Tasks, and daemons of the cluster, that are killed while the check runs.
-const KILLED: [&str; 5] = [
-    "archive-task",
-    "slurmd .* -N n1",
-    "slurmctld",
-    "slurmd .* -N n3",
-    "archive-task",
-];
+const KILLED: [&str; 5] = [TASKS, "n1", "slurmctld", "n3", TASKS];
+const TASKS: &str = "archive-task";
 /// The check takes less than a minute; a task that Slurm holds delays it by minutes.
 const LONGEST: Duration = Duration::from_mins(20);
 
@@ -57,6 +54,22 @@ fn ended(child: &mut Child) -> Option<i32> {
     }
     child.kill().unwrap();
     None
+}
+
+/// Kills the tasks of the check in `folder` that run, at least one; false if the check has ended before.
+fn kill_tasks(folder: &Path, check: &mut Child) -> bool {
+    // The command of sbatch has a quotation mark before the folder.
+    let tasks = format!("{TASKS} {}/", folder.display());
+    let begun = Instant::now();
+    while check.try_wait().unwrap().is_none() {
+        assert!(begun.elapsed() < LONGEST, "no task runs");
+        let killed = Command::new("pkill").args(["-9", "-f", &tasks]).status();
+        if killed.unwrap().success() {
+            return true;
+        }
+        thread::sleep(Duration::from_millis(50));
+    }
+    false
 }
 
 #[test]
@@ -88,15 +101,12 @@ fn killed_daemons_of_a_cluster_change_no_range_check() {
     let mut disturbed = 0;
     for killed in KILLED {
         thread::sleep(Duration::from_secs(2));
-        disturbed += u32::from(far.try_wait().unwrap().is_none());
-        let of_this_cluster = format!(
-            "{killed}.*{}|{}.*{killed}",
-            folder.path().display(),
-            folder.path().display()
-        );
-        let _ = Command::new("pkill")
-            .args(["-9", "-f", &of_this_cluster])
-            .status();
+        if killed == TASKS {
+            disturbed += u32::from(kill_tasks(folder.path(), &mut far));
+        } else {
+            disturbed += u32::from(far.try_wait().unwrap().is_none());
+            kill_daemon(&cluster, killed);
+        }
         virtual_cluster("start", &cluster);
     }
     // Otherwise the archive is too small for this machine.

@@ -143,7 +143,7 @@ exec "$@""#;
     mission.wait_for("the loss", || !mission.ask(lost).is_empty());
     mission.wait_for("scancel", || programs.join("cancelled").exists());
     let job = noted(&programs, "cancelled");
-    assert!(job.starts_with("--quiet --name=areograph-"), "{job}");
+    assert!(job.starts_with("--quiet --me --name=areograph-"), "{job}");
     // Its name is taken.
     let run = job.trim().rsplit("areograph-").next().unwrap().to_owned();
     let site = mission.ask("SELECT site FROM job WHERE id = 1").remove(0);
@@ -217,7 +217,8 @@ fn whatever_is_killed_on_a_cluster_each_job_ends_once() {
         } else {
             // Workers live on; their nodes return.
             let daemons = format!("slurmd -f {}", slurm_conf.display());
-            let _ = Command::new("pkill").args(["-9", "-f", &daemons]).status();
+            let killed = Command::new("pkill").args(["-9", "-f", &daemons]).status();
+            assert!(killed.unwrap().success(), "no daemon was killed");
             sleep(Duration::from_secs(12));
             virtual_cluster("start", &cluster);
         }
@@ -225,8 +226,21 @@ fn whatever_is_killed_on_a_cluster_each_job_ends_once() {
         mission.wait_for_jobs(3 + kill);
         mission.assert_clean("isidis");
     }
-    let doubled = mission.ask("SELECT site FROM run GROUP BY job, attempt HAVING count(*) > 1");
+    let doubled = mission.ask("SELECT site FROM run GROUP BY job HAVING count(*) > 1");
     assert_eq!(doubled, [""; 0]);
+    // No folder of a run is unknown to the database.
+    let mut folders = Vec::new();
+    for site in mission.ask("SELECT DISTINCT site FROM run") {
+        let runs = mission.file(&format!("products/{site}/runs"));
+        let entries = fs::read_dir(runs).unwrap().flatten();
+        let found = entries.filter(|entry| entry.path().join("manifest.json").is_file());
+        folders.extend(found.map(|entry| entry.file_name().into_string().unwrap()));
+    }
+    folders.sort();
+    assert_eq!(
+        folders,
+        mission.ask("SELECT id FROM run WHERE removed_ms IS NULL ORDER BY id")
+    );
     let code = service.end().code();
     virtual_cluster("stop", &cluster);
     assert_eq!(code, Some(0), "{}", mission.log());

@@ -40,9 +40,9 @@ pub struct LaserMounting {
 pub struct BoresightOfSite {
     /// The site.
     pub site: String,
-    /// Images in which the laser took part.
+    /// All images of the site: they share tie points.
     pub images: Vec<String>,
-    /// Orbits of their profiles.
+    /// Orbits of all its profiles.
     pub orbits: Vec<String>,
     /// Normal matrix of the angles: first, both, second; per rad².
     pub matrix: [f64; 3],
@@ -72,7 +72,9 @@ impl BoresightStatements {
         // All values have a form in TOML.
         let content = toml::to_string(self).unwrap_or_default();
         format!(
-            "# Printed by `areograph estimate-boresight --toml`, for adjustment.boresight of site files.\n{content}"
+            "# Printed by `areograph estimate-boresight --toml`, for adjustment.boresight of site files.\n\
+             # Orientations and profile positions of different sites are assumed to be in error independently; an error common to all sites \
+             is not included.\n{content}"
         )
     }
 
@@ -107,11 +109,13 @@ impl BoresightStatements {
         }
         let is_valid = |of: &BoresightOfSite| {
             let [first, both, second] = of.matrix;
-            let rounding = 1e-9 * (first.abs() + second.abs());
+            let sum = first.abs() + second.abs();
+            // Less than this share of the a priori values changes no result.
+            let rounding = 1e-9 * (sum + sigma_rad.powi(-2));
             // Written so that NaN is refused.
             let states = first >= -rounding
                 && second >= -rounding
-                && first * second - both * both >= -rounding * (first.abs() + second.abs());
+                && first * second - both * both >= -rounding * sum;
             states && of.vector.iter().all(|of| of.is_finite()) && !of.images.is_empty()
         };
         let invalid = self.sites.iter().find(|of| !is_valid(of));

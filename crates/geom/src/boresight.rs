@@ -61,7 +61,8 @@ impl BoresightInformation {
         [(0, 0), (0, 1), (1, 1)].map(|at| self.matrix[at])
     }
 
-    /// Of the observations of an adjustment, without its a priori values; `None` for angles that were held.
+    /// Of the observations of an adjustment, without its a priori values; `None` for angles that were held. Directions of which they
+    /// state nothing beyond rounding have no information.
     ///
     /// * `variance_factor` – factor of the covariance of `adjusted` over its cofactors
     #[must_use]
@@ -75,21 +76,37 @@ impl BoresightInformation {
         let vector = (known * adjusted.angles_rad - before * prior.angles_rad) / variance_factor;
         let matrix = (known - before) / variance_factor;
         let is_finite = matrix.iter().chain(&vector).all(|of| of.is_finite());
-        is_finite.then(|| Self {
-            matrix: 0.5 * (matrix + matrix.transpose()),
-            vector,
+        let least = ROUNDING * before.norm() / variance_factor;
+        is_finite.then(|| {
+            Self {
+                matrix: 0.5 * (matrix + matrix.transpose()),
+                vector,
+            }
+            .above(least)
         })
+    }
+
+    /// Without the directions that have at most this information.
+    fn above(&self, least: f64) -> Self {
+        let mut kept = Self::default();
+        for (direction, information) in directions(self, least) {
+            kept.matrix += direction * direction.transpose() * information;
+            kept.vector += direction * direction.dot(&self.vector);
+        }
+        kept
     }
 }
 
+/// Information below this share of the a priori one is rounding of the difference between both.
+const ROUNDING: f64 = 1e-9;
 /// Directions with less information than this share of the a priori one state nothing.
 const INFORMATION_MIN: f64 = 1e-3;
 /// A priori standard deviations are multiplied by this where the sites contradict them.
 const WIDER: f64 = 100.0;
 /// Standard deviations from the a priori value that are a contradiction.
 const CONTRADICTION_SIGMAS: f64 = 3.0;
-/// With fewer sites, the data do not show which one is wrong.
-const TESTED_SITES_MIN: usize = 4;
+/// With fewer sites, the data do not show whether one of them or the a priori value is wrong.
+const TESTED_SITES_MIN: usize = 5;
 /// Quantiles of χ² that one correct site of a thousand exceeds, for 1 and 2 degrees of freedom.
 const SITE_LIMITS: [f64; 2] = [10.83, 13.82];
 
@@ -104,7 +121,7 @@ pub struct PooledBoresight {
     pub freedom: f64,
     /// Their scatter over the stated one, as a standard deviation; above 1, it scales the standard deviations. 1 without freedom.
     pub scatter: f64,
-    /// Whether the sites contradict the a priori standard deviation of each angle, which is then not used.
+    /// Whether at least five sites contradict the a priori standard deviation of each angle, which is then not used.
     pub contradicts_prior: [bool; 2],
 }
 
@@ -117,7 +134,7 @@ pub fn pooled(sites: &[BoresightInformation], prior_sigma_rad: f64) -> PooledBor
     let mut used: Vec<usize> = (0..sites.len()).collect();
     let mut contradicting = Vec::new();
     let weak = [WIDER * prior_sigma_rad; 2];
-    while used.len() > TESTED_SITES_MIN {
+    while used.len() >= TESTED_SITES_MIN {
         let of_site = |place: usize| {
             let others = used.iter().filter(|of| **of != used[place]);
             let others = solved(others.map(|of| &sites[*of]), &weak, 1.0);
@@ -144,6 +161,10 @@ pub fn pooled(sites: &[BoresightInformation], prior_sigma_rad: f64) -> PooledBor
     let mut contradicts_prior = [false; 2];
     let mut sigmas = [prior_sigma_rad; 2];
     for axis in axes {
+        let stating = kept().filter(|of| of.matrix[(axis, axis)] > least).count();
+        if stating < TESTED_SITES_MIN {
+            continue;
+        }
         sigmas[axis] = weak[axis];
         let alone = solved(kept(), &sigmas, scale);
         let expected = alone.covariance_rad2[(axis, axis)] + prior_sigma_rad.powi(2);

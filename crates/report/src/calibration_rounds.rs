@@ -24,10 +24,12 @@ pub(super) fn rounds(
     let words = format!(
         "A round measures tie points, makes the lines consistent with them, and matches a terrain model with cells of {} m to \
          the laser. Tie points and laser points then calibrate the cameras from which the next round starts. Rounds end when \
-         half of the units are shifted by less than {} cells (half a cell, and the errors of the laser) and control residuals change by less \
-         than 2 %, or after {} rounds.",
+         half of the units are shifted by less than {} cells, all units together by less than {} cells (half a cell and the laser errors, in \
+         quadrature), and control residuals change by less than 2 %, or after {} rounds. After a round with shifts of more than five cells, units \
+         are selected again.",
         label(of.cell_m, 0),
         label(of.shift_limit_cells(), 2),
+        label(of.common_limit_cells(), 2),
         of.rounds_max
     );
     Ok(html! {

@@ -18,6 +18,7 @@ use areograph_base::{error::Result, footprints::Footprints, frames::BodyFixed, w
 use areograph_config::MolaSurfaceConfig;
 use areograph_geom::{
     ellipsoid::{Spherical, on_ellipsoid_m},
+    height_grid::HeightGrid,
     surface::SurfaceOptions,
 };
 use areograph_store::{
@@ -63,7 +64,18 @@ impl ShotModel {
     /// The model without its cells, which no page shows.
     #[must_use]
     pub fn without_cells(&self) -> Self {
-        let model = self.model.as_ref().map(|_| SurfaceModel::nothing());
+        let model = self.model.as_ref().map(|_| SurfaceModel {
+            heights: HeightGrid {
+                size: [0; 2],
+                first_rad: [0.0; 2],
+                cell_rad: [1.0; 2],
+                radius_m: 0.0,
+                heights_m: Vec::new(),
+            },
+            parallel_rad: 0.0,
+            sigmas_m: Vec::new(),
+            pairs: Vec::new(),
+        });
         Self {
             model: model.map_err(Clone::clone),
         }

@@ -1,6 +1,6 @@
 //! The check of the files without stored results: in other processes as far as requested, the rest in this one.
 
-use std::{cell::Cell, sync::mpsc::sync_channel, thread};
+use std::{cell::RefCell, sync::mpsc::sync_channel, thread};
 
 use super::{
     Archive, Files,
@@ -92,14 +92,25 @@ fn check_elsewhere(
     for (stored_as, _) in files.todo.values() {
         cache.forget(stored_as);
     }
-    let mut results = Results::new();
-    let stepped = Cell::new(0);
+    let results = RefCell::new(Results::new());
+    // Only results that are used are counted.
+    let take = |left: &[usize]| {
+        let mut results = results.borrow_mut();
+        let before = results.len();
+        for file in left {
+            if results.contains_key(file) {
+                continue;
+            }
+            let (stored_as, inputs) = &files.todo[file];
+            if let Some(found) = cache.load_of_others::<FileRanges>(stored_as, inputs) {
+                results.insert(*file, Ok(found));
+            }
+        }
+        watch.step((results.len() - before) as u64, FILES);
+    };
     for attempt in 1..=workers.attempts() {
-        let left: Vec<usize> = files.todo.keys().copied().collect();
-        let left: Vec<usize> = left
-            .into_iter()
-            .filter(|file| !results.contains_key(file))
-            .collect();
+        let mut left: Vec<usize> = files.todo.keys().copied().collect();
+        left.retain(|file| !results.borrow().contains_key(file));
         if left.is_empty() {
             break;
         }
@@ -107,19 +118,9 @@ fn check_elsewhere(
             path: files.paths[*file].clone(),
             identity: files.sources[file],
         });
-        let before = results.len() as u64;
-        let done = |count: usize| {
-            let now = before + count as u64;
-            watch.step(now.saturating_sub(stepped.get()), FILES);
-            stepped.set(now.max(stepped.get()));
-        };
-        workers.check(attempt, &listed.collect::<Vec<_>>(), watch.stop(), &done)?;
-        for file in left {
-            let (stored_as, inputs) = &files.todo[&file];
-            if let Some(found) = cache.load_of_others::<FileRanges>(stored_as, inputs) {
-                results.insert(file, Ok(found));
-            }
-        }
+        let listed: Vec<ArchiveFile> = listed.collect();
+        workers.check(attempt, &listed, watch.stop(), &|| take(&left))?;
+        take(&left);
     }
-    Ok(results)
+    Ok(results.into_inner())
 }

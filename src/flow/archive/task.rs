@@ -40,7 +40,7 @@ pub trait ArchiveWorkers: Debug {
     /// Has files checked, and returns when no process works on them any more.
     ///
     /// * `attempt` – from 1
-    /// * `done` – receives the number of files with results so far
+    /// * `done` – called when a process has stated that it has stored results
     ///
     /// # Errors
     /// The processes cannot be started or observed; interruption. A failure of a file or a process is none.
@@ -49,7 +49,7 @@ pub trait ArchiveWorkers: Debug {
         attempt: u32,
         files: &[ArchiveFile],
         stop: &AtomicBool,
-        done: &dyn Fn(usize),
+        done: &dyn Fn(),
     ) -> Result<()>;
 
     /// Called after the last attempt with the number of files without a result.

@@ -109,7 +109,7 @@ fn stated_m(site: &Stated, parts: &[&str]) -> Vector3<f64> {
     squares.sum::<Vector3<f64>>().map(f64::sqrt)
 }
 
-/// Parts add up to the whole, to rounding.
+/// Parts add up to the whole, to rounding. A rest below zero is stated as zero, and their sum would then exceed the whole.
 fn is_whole(site: &Stated) {
     let all = site.adjustment["heights"]["mean_sigma_parts"]
         .as_object()

@@ -50,6 +50,17 @@ fn information_is_free_of_the_prior_it_was_estimated_with() {
         assert!((found.matrix * factor - own.matrix).norm() < 1e-9 * own.matrix.norm());
         assert!((found.vector * factor - own.vector).norm() < 1e-9 * own.vector.norm());
     }
+    // Observations that state one angle only: nothing of the other, whose difference is rounding.
+    let prior = BoresightAngles::of_sigma(PRIOR_RAD);
+    let mut adjusted = prior;
+    adjusted.covariance_rad2[(0, 0)] *= 1.0 + 1e-12;
+    adjusted.covariance_rad2[(1, 1)] *= 0.5;
+    let found = BoresightInformation::of(&adjusted, &prior, 1.0).unwrap();
+    let [first, both, second] = found.matrix_terms();
+    let share = second * PRIOR_RAD * PRIOR_RAD;
+    // The difference of the first is -1e-4.
+    assert!(first.abs() < 1e-9 && both.abs() < 1e-3, "{first} {both}");
+    assert!((share - 1.0).abs() < 1e-9, "{share}");
     let held = BoresightAngles::of_sigma(0.0);
     assert_eq!(BoresightInformation::of(&held, &held, 1.0), None);
 }
@@ -149,5 +160,23 @@ fn a_mounting_beyond_its_prior_is_found() {
     assert_eq!(
         pooled(&[], PRIOR_RAD).angles,
         BoresightAngles::of_sigma(PRIOR_RAD)
+    );
+}
+
+#[test]
+fn fewer_than_five_sites_do_not_replace_the_prior() {
+    // Sites that agree on 0.5 mrad towards Y, ±0.05 mrad each, and state nothing towards X.
+    let own = BoresightInformation::new([0.0, 0.0, 4e8], [0.0, 2e5]);
+    let five = pooled(&[own; 5], PRIOR_RAD);
+    assert_eq!(five.contradicts_prior, [false, true]);
+    // The widened a priori value moves it by 2.5 nrad.
+    assert!((five.angles.angles_rad[1] - 5e-4).abs() < 1e-8, "{five:?}");
+    let four = pooled(&[own; 4], PRIOR_RAD);
+    assert_eq!(four.contradicts_prior, [false, false]);
+    // Weights of 16 by the sites and 1 by the a priori value.
+    let expected_rad = 5e-4 * 16.0 / 17.0;
+    assert!(
+        (four.angles.angles_rad[1] - expected_rad).abs() < 1e-9,
+        "{four:?}"
     );
 }

@@ -11,13 +11,13 @@ use super::{heights::Heights, layout::Layout, relative::Mean, unknowns::Unknown}
 /// observations: image coordinates, ranges, spots and given coordinates.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct MeanParts {
-    /// A priori values of orientations, line times and the attitude clock.
+    /// A priori values of orientations, line times and the attitude clock, which the images of a mission phase have in common.
     pub orientations_m2: Matrix3<f64>,
     /// A priori values of the boresight angles of the laser.
     pub boresight_m2: Matrix3<f64>,
     /// Shifts of profiles, of each by itself.
     pub profiles_m2: Matrix3<f64>,
-    /// The shift in plan that all profiles have in common.
+    /// The shift in plan that all profiles have in common, where relief is used; profiles whose shift is an unknown have none.
     pub frame_m2: Matrix3<f64>,
     /// Positions in plan of points and profiles on slopes, where relief does not determine them.
     pub slopes_m2: Matrix3<f64>,

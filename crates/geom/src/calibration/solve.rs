@@ -71,22 +71,22 @@ pub fn solve(
     let mut state = start.from.clone();
     let mut last: Option<Step> = None;
     for steps in 1..=STEPS_MAX {
-        let Linearised {
-            triangle,
-            right,
-            places_m,
-            squares,
-            redundancy,
-        } = linearised(points, &state, start.known, freedom)?;
-        // With residuals of many standard deviations, a whole step may lead away.
-        if let Some(last) = last
-            .as_mut()
-            .filter(|last| squares > (1.0 + ROUNDING) * last.squares)
-        {
+        let here = linearised(points, &state, start.known, freedom);
+        // With residuals of many standard deviations, a whole step may lead away, also to where points have no position.
+        let squares = here.as_ref().map_or(f64::INFINITY, |here| here.squares);
+        let is_away = |last: &Step| squares.is_nan() || squares > (1.0 + ROUNDING) * last.squares;
+        if let Some(last) = last.as_mut().filter(|last| is_away(last)) {
             last.step *= 0.5;
             state = last.from.moved(&freedom.change(&last.step));
             continue;
         }
+        let Linearised {
+            triangle,
+            right,
+            places_m,
+            redundancy,
+            ..
+        } = here?;
         let step = triangle
             .solve_upper_triangular(&right)
             .filter(|step| step.iter().all(|component| component.is_finite()))

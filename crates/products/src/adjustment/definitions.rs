@@ -85,8 +85,9 @@ pub(super) const DEFINITIONS: [(&str, &str); 17] = [
     (
         "mean_sigma_parts",
         "mean_sigma_m by cause; squares of the parts add up to its squares. frame_m and boresight_m are errors that other sites have as \
-         well; profiles_m is shared by sites with the same profiles; all other parts belong to this site alone. Single tie points have \
-         further errors (relative_sigma_* of ties.parquet)",
+         well; profiles_m is shared by sites with the same profiles; all other parts belong to this site alone, except that an offset of \
+         the attitude clock in orientations_m is common to a mission phase. The common shift of profiles (frame_m) is not modelled for \
+         profiles with laser spots (adjustment.common_bus). Single tie points have further errors (relative_sigma_* of ties.parquet)",
     ),
     (
         "other_reading",

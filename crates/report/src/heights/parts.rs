@@ -29,14 +29,9 @@ pub(super) fn parts(heights: &HeightSummary, terms: Terms) -> Markup {
         .iter()
         .filter(|of| of.sigma_m.iter().any(|sigma_m| *sigma_m >= SHOWN_M));
     for part in shown {
-        let shared = if part.of_all_sites {
-            "all sites"
-        } else {
-            "this site"
-        };
         let mut cells = vec![
             Cell::from(terms.fill(part.words).into_owned()),
-            Cell::from(shared),
+            Cell::from(part.shared_by),
         ];
         cells.extend(part.sigma_m.iter().enumerate().map(|(axis, sigma_m)| {
             Cell::from(label(*sigma_m, 1)).traced(format!("/{}/{axis}", part.name))
@@ -47,7 +42,7 @@ pub(super) fn parts(heights: &HeightSummary, terms: Terms) -> Markup {
         (table.finish())
         p {
             "The causes are independent: the squares of their standard deviations add up to those of the mean. Averages over several \
-             sites reduce only errors that other sites do not have."
+             sites reduce only errors that these sites do not share."
         }
     }
 }

@@ -52,7 +52,7 @@ pub fn adopt<W: Workers>(core: &Core<W>) -> Result<()> {
     new_version(core).in_file(&state)
 }
 
-fn adopt_jobs<W: Workers>(core: &Core<W>) -> Stored<()> {
+fn adopt_jobs<W: Workers>(core: &Core<W>) -> Result<()> {
     let states = [JobState::Starting, JobState::Running, JobState::Cancelling];
     for state in states {
         for job in core.shared.read(|connection| jobs_in(connection, state))? {
@@ -90,7 +90,7 @@ fn end(process: &ProcessIdentity) {
     tracing::warn!("process {} cannot be ended", process.pid);
 }
 
-fn finish_for<W: Workers>(core: &Core<W>, job: &Job, newest: Option<AttemptRow>) -> Stored<()> {
+fn finish_for<W: Workers>(core: &Core<W>, job: &Job, newest: Option<AttemptRow>) -> Result<()> {
     let ended = Ended {
         how: How::Cancelled,
         answer: None,
@@ -114,7 +114,11 @@ fn adopt_runs<W: Workers>(core: &Core<W>, site: &SiteRow) -> Result<()> {
     let products = core.shared.config().outputs.products.clone();
     let folder = site_folder(&products, &site.name);
     let linked = current(&folder);
-    for path in tidy(&folder)? {
+    let published = tidy(&folder).unwrap_or_else(|failure| {
+        tracing::warn!("runs of {} are not adopted: {failure}", site.name);
+        Vec::new()
+    });
+    for path in published {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let known = core.shared.read(|connection| run(connection, &name));
         if known.in_file(&path)?.is_some() {

@@ -26,7 +26,7 @@ use crate::{
         run_folder::{bar, remove},
     },
 };
-use areograph_base::error::Error;
+use areograph_base::error::{Error, Result};
 use areograph_config::ExecutorKind;
 
 /// An attempt, and its last report.
@@ -58,13 +58,14 @@ enum Fruit {
 /// Ends an attempt, once; returns the run that it published.
 ///
 /// # Errors
-/// The database cannot be written; then nothing is recorded, and the call can be repeated.
+/// The database cannot be written, or a worker on a node cannot be kept from publishing; then nothing is recorded, and the call can
+/// be repeated.
 pub fn finish<W: Workers>(
     core: &Core<W>,
     attempt: &Attempt,
     ended: &Ended,
     cancel: Option<CancelWhy>,
-) -> Stored<Option<Run>> {
+) -> Result<Option<Run>> {
     let fruit = fruit(core, attempt, ended)?;
     let config = core.shared.config();
     let now_ms = core.now_ms();
@@ -164,21 +165,22 @@ fn standing(state: JobState) -> Option<Standing> {
     }
 }
 
-fn fruit<W: Workers>(core: &Core<W>, attempt: &Attempt, ended: &Ended) -> Stored<Fruit> {
+fn fruit<W: Workers>(core: &Core<W>, attempt: &Attempt, ended: &Ended) -> Result<Fruit> {
     let answer = match &ended.answer {
         Some(Ok(Answer::Run(answer))) => Some(answer),
         _ => None,
     };
     let products = core.shared.config().outputs.products.clone();
     let folder = runs(&products, &attempt.site).join(&attempt.run);
+    let has_run = !attempt.run.is_empty();
     let is_on_cluster = core.shared.config().executor.kind == ExecutorKind::Slurm;
-    let has_begun = !matches!(ended.how, How::NotStarted(_));
-    if is_on_cluster && has_begun && ended.answer.is_none() {
-        // A worker on a lost node may still work: it publishes before this, or not at all.
-        bar(&folder).unwrap_or_else(|failure| tracing::warn!("{failure}"));
+    if has_run && is_on_cluster && ended.answer.is_none() {
+        // A worker on a lost node may still work: it publishes before this, or not at all. Even an srun that started no worker may
+        // have left its job in the queue.
+        bar(&folder)?;
     }
     // A worker that died after publishing has nevertheless published.
-    if !folder.is_dir() {
+    if !has_run || !folder.is_dir() {
         return Ok(match answer {
             Some(answer) if answer.run.is_none() => Fruit::Unchanged,
             _ => Fruit::None(ended.clone()),

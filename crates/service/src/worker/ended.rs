@@ -72,9 +72,14 @@ pub(super) fn exited_on_node(status: Option<ExitStatus>) -> How {
     }
 }
 
-/// The last message of an `srun` that started no worker.
-pub(super) async fn last_line(log: &Path) -> String {
+/// The last messages of an `srun` that started no worker.
+pub(super) async fn last_lines(log: &Path) -> String {
+    const LINES: usize = 3;
     let log = tokio::fs::read_to_string(log).await.unwrap_or_default();
-    let line = log.lines().rfind(|line| !line.trim().is_empty());
-    line.map_or_else(|| "srun stated no reason".to_owned(), str::to_owned)
+    let mut lines: Vec<&str> = log.lines().filter(|line| !line.trim().is_empty()).collect();
+    if lines.is_empty() {
+        return "srun stated no reason".to_owned();
+    }
+    lines.drain(..lines.len().saturating_sub(LINES));
+    lines.join("; ")
 }

@@ -19,7 +19,7 @@ use tokio::{
 
 pub use super::ended::{Ended, How};
 use super::{
-    ended::{exited, exited_on_node, last_line, out_of_memory},
+    ended::{exited, exited_on_node, last_lines, out_of_memory},
     fork::fork,
     lines::{Garbled, LineReader},
     log,
@@ -389,7 +389,7 @@ impl Worker {
         let how = match self.ending {
             Some(ending) if !answered => ending.how,
             _ if self.srun.is_some() => match exited_on_node(status) {
-                How::Exited(_) if !self.hello => How::NotStarted(last_line(&self.log_path).await),
+                How::Exited(_) if !self.hello => How::NotStarted(last_lines(&self.log_path).await),
                 how => how,
             },
             _ if !self.hello => How::NoHello,

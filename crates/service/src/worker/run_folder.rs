@@ -121,6 +121,11 @@ pub fn keep(
 /// # Errors
 /// A disk error.
 pub fn bar(run_folder: &Path) -> Result<()> {
+    if let Some(runs) = run_folder.parent() {
+        fs::create_dir_all(runs)
+            .map_err(IoError::on("create the folder"))
+            .in_file(runs)?;
+    }
     // A folder cannot be renamed to the name of a file.
     match File::create_new(run_folder) {
         Err(error) if error.kind() != ErrorKind::AlreadyExists => {

@@ -65,7 +65,6 @@ impl Srun {
         let minutes = (self.deadline_s / 60.0).ceil() as u64 + MARGIN_MIN;
         let memory_mib = u64::from(self.memory_mib) + MARGIN_MIB;
         let own = [
-            SRUN.to_owned(),
             "--ntasks=1".to_owned(),
             format!("--cpus-per-task={}", self.threads),
             format!("--mem={memory_mib}M"),
@@ -73,8 +72,11 @@ impl Srun {
             format!("--job-name={}", self.job_name),
         ];
         let worker = ["worker".to_owned(), format!("--lease-s={}", self.lease_s)];
-        let own = own.into_iter().chain(self.options.iter().cloned());
-        own.map(OsString::from)
+        // The last of equal options counts: the user's are first.
+        let options = self.options.iter().cloned().chain(own);
+        std::iter::once(SRUN.to_owned())
+            .chain(options)
+            .map(OsString::from)
             .chain([program.as_os_str().to_owned()])
             .chain(worker.map(OsString::from))
             .collect()
@@ -90,7 +92,8 @@ pub fn job_name(run: &str) -> String {
 /// Cancels the job with this name, if there is one, without waiting for the controller.
 pub fn cancel(job_name: &str) {
     let mut scancel = Command::new(SCANCEL);
-    scancel.arg("--quiet").arg(format!("--name={job_name}"));
+    scancel.args(["--quiet", "--me"]);
+    scancel.arg(format!("--name={job_name}"));
     scancel.stdin(Stdio::null()).stdout(Stdio::null());
     // Without an answer of the cluster, the lease of the worker and the lock of its site remain.
     let ended =
@@ -120,12 +123,12 @@ mod tests {
         let command = srun.command(Path::new("/opt/areo graph"));
         let expected = [
             "srun",
+            "--partition=planetary",
             "--ntasks=1",
             "--cpus-per-task=3",
             "--mem=1280M",
             "--time=7",
             "--job-name=areograph-20261122_093000_j1_a1",
-            "--partition=planetary",
             "/opt/areo graph",
             "worker",
             "--lease-s=30",

@@ -1,5 +1,7 @@
 //! A priori boresight of a laser on the bus of the cameras: a standard deviation, or statements of other sites.
 
+use std::collections::BTreeSet;
+
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -8,7 +10,10 @@ use super::{
     input::{AdjustImage, LaserShots},
 };
 use areograph_config::{AdjustmentConfig, BoresightOfSite};
-use areograph_geom::boresight::{BoresightAngles, PooledBoresight, pooled};
+use areograph_geom::{
+    boresight::{BoresightAngles, PooledBoresight, pooled},
+    bundle::Spot,
+};
 
 /// Largest angle between the beam in a camera and the mounting that statements of sites refer to, radians: rounding of kernels, far
 /// below what sites determine.
@@ -47,10 +52,11 @@ impl BoresightPrior {
             &self.left_out,
             "left out, because of a common image or orbit",
         );
-        let contradicting = named(
-            &self.contradicting,
-            "left out, because the others contradict",
-        );
+        let contradicting = match self.contradicting.len() {
+            1 => "withheld: contradicts the other sites",
+            _ => "withheld: contradict the other sites",
+        };
+        let contradicting = named(&self.contradicting, contradicting);
         Some(format!(
             "across-track positions depend on adjustment.boresight: {sites}{}{}",
             left_out.unwrap_or_default(),
@@ -59,13 +65,14 @@ impl BoresightPrior {
     }
 }
 
-/// A priori boresight of the laser in `images`, which has spots of `shots`.
+/// A priori boresight of the laser, which has these `spots` of `shots` in `images`. Images without spots may have another mounting.
 ///
 /// # Errors
 /// Statements of sites about another mounting.
 pub(super) fn prior_of<M>(
     images: &[AdjustImage<M>],
     shots: &LaserShots,
+    spots: &[Spot],
     config: &AdjustmentConfig,
 ) -> Result<BoresightPrior, AdjustError> {
     let Some(statements) = &config.boresight else {
@@ -77,7 +84,8 @@ pub(super) fn prior_of<M>(
         });
     };
     let mountings = &statements.mountings;
-    for image in images {
+    let with_spots: BTreeSet<usize> = spots.iter().map(|spot| spot.view.image).collect();
+    for image in with_spots.into_iter().map(|index| &images[index]) {
         let Some(beam) = image.beam() else { continue };
         let apart_rad = |of: &[f64; 3]| beam.angle(&Vector3::from(*of));
         let least_rad = mountings
@@ -100,10 +108,8 @@ pub(super) fn prior_of<M>(
         .iter()
         .map(|image| image.oriented_camera.id.clone())
         .collect();
-    let with_range = shots.shots.iter().filter(|shot| shot.range.is_some());
-    let orbits: Vec<String> = with_range
-        .map(|shot| orbit_of(&shots.profiles[shot.profile]).to_owned())
-        .collect();
+    let orbits = shots.profiles.iter();
+    let orbits: Vec<String> = orbits.map(|of| orbit_of(of).to_owned()).collect();
     let (left_out, used): (Vec<&BoresightOfSite>, Vec<_>) = statements
         .sites
         .iter()
@@ -127,8 +133,39 @@ pub(super) fn prior_of<M>(
     })
 }
 
-/// The orbit in the name of a profile, which consists of window and orbit.
-#[must_use]
-pub fn orbit_of(profile: &str) -> &str {
-    profile.rsplit('/').next().unwrap_or(profile)
+/// The orbit in the name of a profile: `<window>/<orbit>`, with `.2`, `.3` … where the orbit crosses the window again.
+fn orbit_of(profile: &str) -> &str {
+    let crossing = profile.rsplit('/').next().unwrap_or(profile);
+    crossing.split('.').next().unwrap_or(crossing)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_crossing_of_a_window_has_the_number_of_its_orbit() {
+        for profile in ["window/9044", "window/9044.2", "9044"] {
+            assert_eq!(orbit_of(profile), "9044");
+        }
+    }
+
+    #[test]
+    fn a_remark_names_the_sites_that_are_not_used() {
+        let remark = |contradicting: &[&str]| {
+            let prior = BoresightPrior {
+                angles: BoresightAngles::of_sigma(1e-4),
+                sites: vec!["eos".to_owned()],
+                left_out: Vec::new(),
+                contradicting: contradicting.iter().map(|of| (*of).to_owned()).collect(),
+            };
+            prior.remark().unwrap()
+        };
+        assert!(remark(&["isidis"]).ends_with("; isidis withheld: contradicts the other sites"));
+        let both = remark(&["isidis", "gusev"]);
+        assert!(
+            both.ends_with("; isidis, gusev withheld: contradict the other sites"),
+            "{both}"
+        );
+    }
 }

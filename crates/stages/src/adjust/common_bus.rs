@@ -90,7 +90,7 @@ pub(super) fn add_spots<M: ExteriorOrientation>(
             shared,
         }
     });
-    let boresight = prior_of(images, shots, config)?;
+    let boresight = prior_of(images, shots, &spots, config)?;
     assembled.network.common_bus = Some(CommonBus {
         boresight: boresight.angles,
         line_time_sigma_s: config.boresight_line_time_sigma_s.unwrap_or(f64::INFINITY),

@@ -10,7 +10,8 @@ use areograph_base::schema::none_negative;
 /// independent: the squares of all add up to those of `mean_sigma_m`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MeanSigmaParts {
-    /// Shift in plan that all profiles of the altimeter have in common. Other sites have the same error.
+    /// Shift in plan that all profiles of the altimeter have in common, if relief is used. Other sites have the same error. It is not
+    /// modelled for profiles with laser spots (`adjustment.common_bus`).
     #[schemars(transform = none_negative)]
     pub frame_m: [f64; 3],
     /// Boresight of the laser (`adjustment.common_bus`). Other sites have the same error.
@@ -19,7 +20,8 @@ pub struct MeanSigmaParts {
     /// Shifts of the profiles, of each by itself. Sites with the same profiles share this error.
     #[schemars(transform = none_negative)]
     pub profiles_m: [f64; 3],
-    /// A priori orbit, attitude and line times of the images of this site.
+    /// A priori orbit, attitude and line times of the images of this site. An offset of the attitude clock
+    /// (`adjustment.attitude_clock`) is part of it, and common to the sites of a mission phase.
     #[schemars(transform = none_negative)]
     pub orientations_m: [f64; 3],
     /// Horizontal positions of images and profiles on slopes, where relief does not determine them.
@@ -43,64 +45,71 @@ pub struct MeanSigmaPart {
     pub name: &'static str,
     /// The cause, with terms of the site in braces.
     pub words: &'static str,
-    /// Whether other sites have the same error.
+    /// The sites that have the same error.
+    pub shared_by: &'static str,
+    /// Whether these are all sites.
     pub of_all_sites: bool,
     /// Standard deviations in east, north and height, metres.
     pub sigma_m: [f64; 3],
 }
 
+const ALL_SITES: &str = "all sites";
+const SAME_PROFILES: &str = "sites with the same profiles";
+const THIS_SITE: &str = "this site";
+
 impl MeanSigmaParts {
     /// The causes, those common to all sites first.
     #[must_use]
     pub fn all(&self) -> [MeanSigmaPart; 8] {
-        let part = |name, words, of_all_sites, sigma_m| MeanSigmaPart {
+        let part = |name, words, shared_by: &'static str, sigma_m| MeanSigmaPart {
             name,
             words,
-            of_all_sites,
+            shared_by,
+            of_all_sites: shared_by == ALL_SITES,
             sigma_m,
         };
         [
             part(
                 "frame_m",
                 "shift common to all {altimeter} profiles",
-                true,
+                ALL_SITES,
                 self.frame_m,
             ),
             part(
                 "boresight_m",
                 "boresight of the laser",
-                true,
+                ALL_SITES,
                 self.boresight_m,
             ),
             part(
                 "profiles_m",
                 "shifts of single profiles",
-                false,
+                SAME_PROFILES,
                 self.profiles_m,
             ),
             part(
                 "orientations_m",
                 "a priori orbit, attitude and line times",
-                false,
+                THIS_SITE,
                 self.orientations_m,
             ),
             part(
                 "slopes_m",
                 "horizontal position on slopes",
-                false,
+                THIS_SITE,
                 self.slopes_m,
             ),
-            part("ground_m", "ground between shots", false, self.ground_m),
+            part("ground_m", "ground between shots", THIS_SITE, self.ground_m),
             part(
                 "observations_m",
                 "tie points and other observations",
-                false,
+                THIS_SITE,
                 self.observations_m,
             ),
             part(
                 "beyond_limit_m",
                 "tie points beyond the limit",
-                false,
+                THIS_SITE,
                 self.beyond_limit_m,
             ),
         ]

@@ -57,7 +57,7 @@ pub use adjusted::{
     Adjusted, CorrectedImage, CorrectedPoint, ImageResidual, RangeResidual, ScalarResidual,
 };
 pub use boresight::{BoresightSummary, SpotsOfImage};
-pub use boresight_prior::{BoresightPrior, orbit_of};
+pub use boresight_prior::BoresightPrior;
 pub use components::WORSE_THAN_CONFIGURED;
 pub use error::AdjustError;
 pub use height_summary::HeightSummary;

@@ -189,7 +189,7 @@ pub struct ControlFigures {
 }
 
 /// Root mean square distances in the focal plane and on the ground; missing for a camera without points.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct PixelsAndMetres {
     /// Root mean square distance in the focal plane, pixels.
     #[serde(skip_serializing_if = "areograph_base::stored::is_left_out")]
@@ -286,6 +286,8 @@ pub struct CalibrationRound {
     pub judging: [u64; 2],
     /// Median length of the shifts of kept units that calibrate, cells.
     pub shift_cells: f64,
+    /// Length of the median of these shifts, cells.
+    pub common_shift_cells: f64,
     /// Median of model minus laser height, metres.
     pub bias_m: Option<f64>,
     /// Residuals of control, root mean square over all lines, pixels and metres on the ground.

@@ -15,6 +15,8 @@ use areograph_geom::statistics::Summary;
 const SHIFT_CELLS: f64 = 0.5;
 /// Median length of a vector of two coordinates with a standard deviation of one: √(2 ln 2).
 const MEDIAN_LENGTH: f64 = 1.177;
+/// Standard deviation of the median of many coordinates over that of their mean: √(π/2).
+const MEDIAN_SCATTER: f64 = 1.253;
 const CONTROL_SHARE: f64 = 0.02;
 /// After a round with a larger shift, cells, the shots of units are selected anew: the model that follows lies so far from the former one that
 /// other shots are on it.
@@ -70,6 +72,7 @@ impl CalibrationRound {
             units: units(false),
             judging: units(true),
             shift_cells: shift_cells(&control.units),
+            common_shift_cells: common_shift_cells(&control.units),
             bias_m: control.bias_m,
             control: rms(PointKind::Control),
             held_back: rms(PointKind::HeldBack),
@@ -120,6 +123,22 @@ fn shift_cells(units: &[UnitResult]) -> f64 {
     Summary::of(&lengths).median
 }
 
+/// Length of the median shift of kept units that calibrate, cells: what they have in common.
+fn common_shift_cells(units: &[UnitResult]) -> f64 {
+    let kept = units.iter().filter(|unit| unit.is_kept() && !unit.judges);
+    let shifts: Vec<[f64; 2]> = kept
+        .filter_map(|unit| Some(unit.found?.shift_cells))
+        .collect();
+    if shifts.is_empty() {
+        return f64::INFINITY;
+    }
+    let median = |axis: usize| {
+        let of: Vec<f64> = shifts.iter().map(|shift| shift[axis]).collect();
+        Summary::of(&of).median
+    };
+    median(0).hypot(median(1))
+}
+
 impl Rounds {
     /// Share by which the residuals of control changed in the last round, root mean square over units that the last two
     /// rounds used: units near the limits of a match vary from round to round. Infinite in the first, and where the shots of units were
@@ -151,6 +170,21 @@ impl Rounds {
         SHIFT_CELLS.hypot(MEDIAN_LENGTH * self.laser_sigma_m / self.cell_m)
     }
 
+    /// Limit of the shift that units have in common, cells: errors of the laser differ between units.
+    #[must_use]
+    pub fn common_limit_cells(&self) -> f64 {
+        let units = self.rounds.last().map_or(1, |round| round.units[0].max(1));
+        let laser_cells = self.laser_sigma_m / self.cell_m / (units as f64).sqrt();
+        SHIFT_CELLS.hypot(2.0 * MEDIAN_SCATTER * laser_cells)
+    }
+
+    /// Length of the median shift of units in the last round, cells.
+    fn common_shift_cells(&self) -> f64 {
+        self.rounds
+            .last()
+            .map_or(f64::INFINITY, |round| round.common_shift_cells)
+    }
+
     /// Median shift of units in the last round, cells.
     fn shift_cells(&self) -> f64 {
         self.rounds
@@ -161,13 +195,15 @@ impl Rounds {
     /// Whether the next round selects the shots of units anew.
     #[must_use]
     pub fn selects_again(&self) -> bool {
-        self.shift_cells() > SELECT_CELLS
+        self.shift_cells() > SELECT_CELLS.max(2.0 * self.shift_limit_cells())
     }
 
     /// Whether another round would change nothing significant.
     #[must_use]
     pub fn is_converged(&self) -> bool {
-        self.shift_cells() < self.shift_limit_cells() && self.control_share() < CONTROL_SHARE
+        self.shift_cells() < self.shift_limit_cells()
+            && self.common_shift_cells() < self.common_limit_cells()
+            && self.control_share() < CONTROL_SHARE
     }
 }
 
@@ -185,13 +221,15 @@ impl Calibration {
         if !rounds.is_converged() {
             let change = match rounds.control_share() {
                 share if share.is_finite() => format!("{:.1} %", 100.0 * share),
-                _ => "an unknown share".to_owned(),
+                _ => "an unknown share (rounds with different units cannot be compared)".to_owned(),
             };
             reasons.push(format!(
-                "no convergence in {count} rounds: in the last round, units were shifted by {:.2} cells (median), and \
-                 residuals of control changed by {change}; expected less than {:.2} cells and {:.0} %",
+                "no convergence in {count} rounds: in the last round, units were shifted by {:.2} cells (median), together by {:.2} \
+                 cells, and residuals of control changed by {change}; expected less than {:.2} cells, {:.2} cells and {:.0} %",
                 rounds.shift_cells(),
+                rounds.common_shift_cells(),
                 rounds.shift_limit_cells(),
+                rounds.common_limit_cells(),
                 100.0 * CONTROL_SHARE
             ));
         }
@@ -228,5 +266,72 @@ impl Calibration {
             rounds: Some(rounds),
             ..self
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn round(
+        number: u32,
+        units_of: u32,
+        [shift, common]: [f64; 2],
+        unit_px: f64,
+    ) -> CalibrationRound {
+        CalibrationRound {
+            round: number,
+            units_of,
+            ties: 0,
+            model_tie_px: None,
+            tie_px: None,
+            filled: 1.0,
+            units: [50, 0],
+            judging: [0; 2],
+            shift_cells: shift,
+            common_shift_cells: common,
+            bias_m: None,
+            control: PixelsAndMetres::default(),
+            held_back: PixelsAndMetres::default(),
+            unit_px: BTreeMap::from([(1, unit_px)]),
+            held_back_scatter: None,
+            angles_rad: Vec::new(),
+            drift_m_per_line: [0.0; 3],
+        }
+    }
+
+    fn rounds(laser_sigma_m: f64, last: CalibrationRound) -> Rounds {
+        Rounds {
+            rounds: vec![round(1, 1, [0.9, 0.1], 1.0), last],
+            rounds_max: 10,
+            cell_m: 100.0,
+            laser_sigma_m,
+        }
+    }
+
+    #[test]
+    fn units_may_scatter_as_the_laser_does_and_not_lie_off_together() {
+        let last = |shifts| round(2, 1, shifts, 1.01);
+        // 70 m are 0.96 cells for half of the units, and with 50 units 0.56 cells for all together.
+        assert!(rounds(70.0, last([0.9, 0.2])).is_converged());
+        assert!(!rounds(70.0, last([0.9, 0.8])).is_converged());
+        assert!(!rounds(70.0, last([1.2, 0.2])).is_converged());
+        // An exact laser permits half a cell.
+        assert!(!rounds(1.0, last([0.9, 0.2])).is_converged());
+        assert!(rounds(1.0, last([0.4, 0.2])).is_converged());
+    }
+
+    #[test]
+    fn rounds_with_other_units_are_not_compared() {
+        let again = rounds(70.0, round(2, 2, [0.9, 0.2], 1.0));
+        assert!(!again.is_converged());
+        let far = rounds(70.0, round(2, 1, [5.5, 5.5], 1.0));
+        assert!(far.selects_again());
+        // With cells of 10 m, errors of the laser alone are more than five cells.
+        let fine = Rounds {
+            cell_m: 10.0,
+            ..rounds(70.0, round(2, 1, [8.0, 0.2], 1.0))
+        };
+        assert!(!fine.selects_again());
     }
 }

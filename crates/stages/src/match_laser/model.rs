@@ -164,7 +164,7 @@ fn few_units(control: &LaserMatch) -> Option<FewUnits> {
         of: [false, true].map(units),
         commonest: commonest.map_or_else(String::new, |units| {
             format!(
-                "The most frequent reason, of {} units: {}",
+                "Most frequent reason (units: {}): {}",
                 units.len(),
                 units[0]
             )

@@ -140,9 +140,12 @@ pub struct LaserMatch {
     pub complaint_count: u64,
 }
 
+/// Shots of a concordance.
+const SHOTS_MIN: usize = 4;
+
 impl LaserMatch {
-    /// Concordance of heights of an earlier model and of this model with the laser, without any shift, at the held-out shots of every kept unit: its
-    /// number and both values. Units without a value by either model are left out.
+    /// Concordance of heights of an earlier model and of this model with the laser, without any shift, at the held-out shots of every kept unit at which both
+    /// have heights: its number and both values. Units with fewer than four such shots are left out.
     ///
     /// # Source
     /// Li et al. 2023, eq. 18 and Table 4.
@@ -152,24 +155,32 @@ impl LaserMatch {
         let earlier_m: BTreeMap<&str, f64> = shots
             .filter_map(|shot| Some((&*shot.name, shot.model_m?)))
             .collect();
-        let mut pairs: BTreeMap<usize, Vec<[f64; 2]>> = BTreeMap::new();
+        let mut heights_m: BTreeMap<usize, Vec<[f64; 3]>> = BTreeMap::new();
         let shots = self.passes.iter().flat_map(|pass| &pass.shots);
         for shot in shots.filter(|shot| shot.is_held_out) {
-            if let Some((unit, model_m)) = shot.unit.zip(earlier_m.get(&*shot.name)) {
-                let of_unit = pairs.entry(unit).or_default();
-                of_unit.push([*model_m, shot.laser_m]);
+            let earlier_m = earlier_m.get(&*shot.name);
+            if let (Some(unit), Some(earlier_m), Some(model_m)) =
+                (shot.unit, earlier_m, shot.model_m)
+            {
+                let of_unit = heights_m.entry(unit).or_default();
+                of_unit.push([*earlier_m, model_m, shot.laser_m]);
             }
         }
         let kept = self.units.iter().filter(|unit| unit.is_kept());
         let concordances = kept.filter_map(|unit| {
-            let pairs = pairs.get(&unit.unit)?;
-            let [_, middle_m] = *pairs.first()?;
-            let mut moments = Moments::default();
-            for [model_m, laser_m] in pairs {
-                moments.add(model_m - middle_m, laser_m - middle_m);
+            let heights_m = heights_m.get(&unit.unit)?;
+            let [.., middle_m] = *heights_m.first()?;
+            if heights_m.len() < SHOTS_MIN {
+                return None;
             }
-            let before = moments.similarity(Similarity::Ccc)?;
-            Some((unit.unit, [before, unit.concordance[0]?]))
+            let of = |model: usize| {
+                let mut moments = Moments::default();
+                for of_shot in heights_m {
+                    moments.add(of_shot[model] - middle_m, of_shot[2] - middle_m);
+                }
+                moments.similarity(Similarity::Ccc)
+            };
+            Some((unit.unit, [of(0)?, of(1)?]))
         });
         concordances.collect()
     }

@@ -298,3 +298,25 @@ pub(super) fn refuse_lonely(units: &mut [UnitResult], search_cells: u32) -> usiz
     }
     shifts.len()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shifts_below_a_cell_may_be_worse_by_noise_and_others_must_be_better() {
+        let held_out = |after_m: f64| HeldOut {
+            shots: 4,
+            before_m: 10.0,
+            after_m,
+        };
+        let is_kept = |after_m: f64, east: f64, used: usize| {
+            not_better(Some(&held_out(after_m)), [0.0, east], used).is_none()
+        };
+        // √(1 + 24/12) = 1.73, and √(1 + 24/400) = 1.03, where the factor is 1.1.
+        assert!(is_kept(17.0, 0.8, 12) && !is_kept(17.6, 0.8, 12));
+        assert!(is_kept(10.9, 0.8, 400) && !is_kept(11.1, 0.8, 400));
+        assert!(is_kept(9.9, 1.2, 12) && !is_kept(10.1, 1.2, 12));
+        assert!(!is_kept(f64::NAN, 0.8, 12));
+    }
+}

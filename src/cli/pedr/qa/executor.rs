@@ -138,7 +138,7 @@ impl ArchiveWorkers for SlurmTasks<'_> {
         attempt: u32,
         files: &[ArchiveFile],
         stop: &AtomicBool,
-        done: &dyn Fn(usize),
+        done: &dyn Fn(),
     ) -> Result<()> {
         let bytes: Vec<u64> = files.iter().map(|file| file.identity.bytes).collect();
         let limit = u64::from(self.executor.mb_per_task) * BYTES_PER_MB;
@@ -158,9 +158,7 @@ impl ArchiveWorkers for SlurmTasks<'_> {
         let tasks: Vec<ArchiveTask> = tasks.collect();
         let read = |_: &ArchiveTask, bytes: &[u8]| serde_json::from_slice::<usize>(bytes).ok();
         self.cluster()?
-            .attempt(attempt, &tasks, stop, read, |counts| {
-                done(counts.values().sum());
-            })?;
+            .attempt(attempt, &tasks, stop, read, |_| done())?;
         Ok(())
     }
 
