@@ -9,7 +9,10 @@
     reason = "tests work in temporary folders and may fail loudly"
 )]
 
-use crate::common;
+use crate::{
+    calibration_loop::{checked_errors_m, plane_and_height_m},
+    common,
+};
 
 use std::{
     collections::BTreeSet,
@@ -19,19 +22,12 @@ use std::{
 };
 
 use areograph::{
-    body::Body,
     config::{CalibrationConfig, Document as _},
     flow::Task,
-    geom::ellipsoid::local_axes,
     scene::{OrbitsScene, write_calibration_images},
-    stages::line_camera::LineCamera,
     watch::Watch,
 };
 use common::{flows::run_into, json, long_test, number};
-use nalgebra::{Matrix3, Vector3};
-use serde_json::Value;
-
-const STEREO: [&str; 2] = ["s1", "s2"];
 
 fn write(folder: &Path, seed: u64, orbit_errors: f64, size: Option<[u32; 2]>) {
     let scene = OrbitsScene {
@@ -42,36 +38,6 @@ fn write(folder: &Path, seed: u64, orbit_errors: f64, size: Option<[u32; 2]>) {
     };
     let stop = AtomicBool::new(false);
     write_calibration_images(folder, &scene, size, Watch::from(&stop)).unwrap();
-}
-
-/// Errors of the checked places of an orbit with support data of the stereo lines: east, north, up, metres.
-fn errors_m(truth: &Value, orbit: &str, support: &dyn Fn(&str) -> PathBuf) -> Vec<Vector3<f64>> {
-    let lines = STEREO.map(|line| LineCamera::read(&support(line), line, Body::Mars).unwrap());
-    let error_m = |of: &Value| {
-        let place_m = Vector3::from([0, 1, 2].map(|axis| number(&of["place_m"][axis])));
-        let (mut normals, mut right) = (Matrix3::zeros(), Vector3::zeros());
-        for (line, name) in lines.iter().zip(STEREO) {
-            let [at_line, sample] = [0, 1].map(|axis| number(&of["seen"][name][axis]));
-            let ray = line.camera.ray(at_line, sample);
-            let direction = ray.direction();
-            let across = Matrix3::identity() - direction * direction.transpose();
-            normals += across;
-            right += across * ray.position_m;
-        }
-        let found_m = normals.try_inverse().unwrap() * right;
-        local_axes(&place_m) * (found_m - place_m)
-    };
-    let checked = truth[orbit]["checked"].as_array().unwrap();
-    checked.iter().map(error_m).collect()
-}
-
-/// Root mean square in the plane and in height.
-fn plane_and_height_m(errors_m: &[Vector3<f64>]) -> [f64; 2] {
-    let rms = |of: &dyn Fn(&Vector3<f64>) -> f64| {
-        let sum: f64 = errors_m.iter().map(of).sum();
-        (sum / errors_m.len() as f64).sqrt()
-    };
-    [rms(&|of| of.xy().norm_squared()), rms(&|of| of.z * of.z)]
 }
 
 /// Images of all lines lose by compression and have shadows; another orbit has other ground, laser passes of its own, and
@@ -122,7 +88,7 @@ fn calibrated(seed: u64, orbit_errors: f64) -> (Vec<[f64; 2]>, Vec<String>) {
         let run = run_into(Task::Calibration(&config), &scene.join("out"), false).unwrap();
         reasons.clone_from(&run.manifest().unwrap().verdict.reasons);
         let of = |support: &dyn Fn(&str) -> PathBuf| {
-            plane_and_height_m(&errors_m(&truth, orbit, support))
+            plane_and_height_m(&checked_errors_m(&truth[orbit], support))
         };
         let given_m = of(&|line| scene.join(format!("isd/{orbit}_{line}.json")));
         let found_m = of(&|line| run.folder.join(format!("cameras/{line}/isd.json")));

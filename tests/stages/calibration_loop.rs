@@ -107,7 +107,14 @@ fn refused(name: &str, replaced: &[(&str, &str)]) -> String {
 
 /// Where the calibrated stereo lines have the checked places, minus where these are: east, north, up, metres.
 fn errors_m(folder: &Path, support: impl Fn(&str) -> std::path::PathBuf) -> Vec<Vector3<f64>> {
-    let truth = json(&folder.join("lines/truth.json"));
+    checked_errors_m(&json(&folder.join("lines/truth.json")), support)
+}
+
+/// The same for the true values of an orbit.
+pub(crate) fn checked_errors_m(
+    truth: &Value,
+    support: impl Fn(&str) -> std::path::PathBuf,
+) -> Vec<Vector3<f64>> {
     let lines = STEREO.map(|line| LineCamera::read(&support(line), line, Body::Mars).unwrap());
     let checked = truth["checked"].as_array().unwrap();
     let error_m = |of: &Value| {
@@ -135,7 +142,7 @@ fn rms(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// Root mean square in the plane and in height.
-fn plane_and_height_m(errors_m: &[Vector3<f64>]) -> [f64; 2] {
+pub(crate) fn plane_and_height_m(errors_m: &[Vector3<f64>]) -> [f64; 2] {
     let plane_m = rms(errors_m.iter().map(|of| of.xy().norm()));
     [plane_m, rms(errors_m.iter().map(|of| of.z))]
 }
