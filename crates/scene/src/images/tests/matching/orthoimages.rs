@@ -189,13 +189,18 @@ impl Judged {
         let squares_m2 = errors_m.iter().map(|of| (of - mean_m).norm_squared());
         let about_m = (squares_m2.sum::<f64>() / count).sqrt();
         let number = |place: &str| stated.pointer(place).unwrap().as_f64().unwrap();
+        // Adjusted images share this error, others have one each.
+        let is_stated = |name: &&str| stated.get(*name).is_some_and(serde_json::Value::is_array);
+        let of_mean = ["shared_sigma_m", "image_sigma_m"];
+        let of_mean = of_mean.into_iter().find(is_stated).unwrap();
+        let mean_sigma = |axis: usize| number(&format!("/{of_mean}/{axis}"));
         println!(
             "orthoimage of {id}: {count} places, mean error {:.1} and {:.1} m, {about_m:.2} m about it; stated {:.1} and \
              {:.1} m, {:.2} m (jitter {:.2} m, drift {:.2} m)",
             mean_m.x,
             mean_m.y,
-            number("/shared_sigma_m/0"),
-            number("/shared_sigma_m/1"),
+            mean_sigma(0),
+            mean_sigma(1),
             number("/sigma_m"),
             // Omitted where no scatter was measured.
             stated
@@ -205,7 +210,7 @@ impl Judged {
         );
         assert!(errors_m.len() >= 30);
         Self {
-            mean: [0, 1].map(|axis| [mean_m[axis], number(&format!("/shared_sigma_m/{axis}"))]),
+            mean: [0, 1].map(|axis| [mean_m[axis], mean_sigma(axis)]),
             // With a tenth of a pixel of the comparison itself.
             about: [about_m, number("/sigma_m").hypot(0.1 * number("/pixel_m"))],
         }
