@@ -45,6 +45,7 @@ mod origin;
 mod role;
 mod select;
 mod session;
+mod tabulated;
 mod text_kernel;
 mod trajectory;
 mod utc_clock;

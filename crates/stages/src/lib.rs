@@ -46,7 +46,7 @@ pub mod tag_times;
 pub mod tag_utc;
 pub mod triangulate;
 
-use shared::{calibrated_camera, ground, image_view, raster, turn};
+use shared::{calibrated_camera, ground, image_view, raster, spacecraft_grid, turn};
 pub use shared::{
     camera_lines, image_pixels, line_camera, look, mola_surface, orientation, oriented,
     shot_heights, site_image,

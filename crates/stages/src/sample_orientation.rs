@@ -146,7 +146,8 @@ pub fn sample_orientation(
     pointing: &PointingConfig,
     sampling: &OrientationConfig,
 ) -> Result<Orientation> {
-    let session = &session.of(image.instrument.spacecraft);
+    let reach = (sampling.light_time).read_over(image.exposures().padded(kernels.padding_s));
+    let session = &session.of(image.instrument.spacecraft).tabulated(reach);
     let reader = CameraReader {
         session,
         instrument: &image.instrument,

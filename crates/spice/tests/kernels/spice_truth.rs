@@ -206,6 +206,43 @@ fn apparent_positions_and_the_sun_are_those_of_the_support_data() {
 }
 
 #[test]
+fn tabulated_states_of_real_kernels_are_those_that_cspice_reads() {
+    let (Some((set, _)), Some(isd)) = (
+        image("tabulated states"),
+        real_data("ale_mgs/isds/mgsmocna_isd.json", "tabulated states"),
+    ) else {
+        return;
+    };
+    let session = Session::open(&set).unwrap();
+    let epochs = &json(&isd)["instrument_position"]["ephemeris_times"];
+    let epochs: Vec<f64> = rows(epochs).iter().map(number).collect();
+    let [first, last] = [epochs[0], epochs[epochs.len() - 1]].map(Et::from_seconds);
+    let over = Interval::new(first, last);
+    let tabulated = session.of(session.spacecraft()).tabulated(over);
+    let (mut worst_m, mut worst_m_s, mut differ) = (0.0_f64, 0.0_f64, 0);
+    for k in 0..1_000 {
+        let et = first.plus(over.duration_s() * f64::from(k) / 1_000.0);
+        for (found, read) in [
+            (tabulated.state(et), session.state(et)),
+            (tabulated.apparent_state(et), session.apparent_state(et)),
+        ] {
+            let [found, read] = [found.unwrap(), read.unwrap()];
+            worst_m = worst_m.max((found.position.xyz_m - read.position.xyz_m).norm());
+            worst_m_s = worst_m_s.max((found.velocity_m_s - read.velocity_m_s).norm());
+            differ += i32::from(found != read);
+        }
+    }
+    println!("{worst_m:.1e} m, {worst_m_s:.1e} m/s, {differ} of 2000 differ in the last bits");
+    // As `Session::tabulated` states; states that never differ were not tabulated.
+    assert!(worst_m < 3e-4 && worst_m_s < 1e-5 && differ > 0);
+    let before = first.plus(-1.0);
+    assert_eq!(
+        tabulated.state(before).unwrap(),
+        session.state(before).unwrap()
+    );
+}
+
+#[test]
 fn a_mounting_is_read_once_only_where_it_is_constant() {
     let (Some(folder), Some((_, truth))) = (
         real_data("ale_mgs/m0402852", "mountings"),

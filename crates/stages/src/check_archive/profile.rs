@@ -10,8 +10,13 @@ use super::{
 use crate::{
     check_ranges::{BiasScan, RangeFigures, ScannedRadius},
     group_profiles::Profile,
+    spacecraft_grid::SpacecraftGrid,
 };
-use areograph_base::{footprints::Footprint, time::Et, units::RADIANS_PER_DEGREE};
+use areograph_base::{
+    footprints::Footprint,
+    time::{Et, Interval},
+    units::RADIANS_PER_DEGREE,
+};
 use areograph_geom::{range_residuals::RangeResiduals, statistics::Summary};
 use areograph_pds::archive::spans;
 use areograph_spice::Trajectory;
@@ -352,7 +357,10 @@ fn scan(
     let kept: Vec<Footprint> = kept.map(|(_, shot)| *shot).collect();
     let step = kept.len().div_ceil(SCANNED).max(1);
     let thinned: Vec<Footprint> = kept.into_iter().step_by(step).collect();
-    BiasScan::of(&thinned, trajectory, rules.limits)
+    let [first, last] = [thinned.first()?, thinned.last()?].map(|shot| shot.et_tag_s);
+    let tags = Interval::new(Et::from_seconds(first), Et::from_seconds(last));
+    let grid = SpacecraftGrid::over(trajectory, tags.padded(rules.limits.scan_half_width_s));
+    BiasScan::of(&thinned, &grid, rules.limits)
 }
 
 fn places_deg(gathered: &Gathered) -> Vec<[f64; 2]> {

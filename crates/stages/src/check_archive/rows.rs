@@ -4,9 +4,9 @@ use std::{collections::BTreeMap, ops::Range};
 
 use super::{
     ArchiveRules,
-    spacecraft::{FrameSpacecraft, StateGrid, state},
+    spacecraft::{FrameSpacecraft, StateGrid},
 };
-use crate::convert_datum::DatumTurn;
+use crate::{convert_datum::DatumTurn, spacecraft_grid::state};
 use areograph_base::{footprints::Footprint, time::Et};
 use areograph_geom::range_residuals::{NearbyShot, RangeResiduals};
 use areograph_pds::{

@@ -1,12 +1,10 @@
 //! The spacecraft over a frame: four states, and the cubics through them. The states follow from those of a grid of whole
 //! steps, which frames share.
 
-use nalgebra::{Matrix3, Vector3};
-
-use areograph_base::{
-    frames::Position,
-    time::{Et, Interval},
+use crate::spacecraft_grid::{
+    GRID_BEFORE, GRID_END, GRID_LAST, GRID_S, GRID_STATES, combined, grid_weights, state,
 };
+use areograph_base::time::{Et, Interval};
 use areograph_geom::range_residuals::SpacecraftState;
 use areograph_spice::Trajectory;
 
@@ -33,18 +31,9 @@ impl FrameSpacecraft {
     /// 1e-6 m: of an orbit of 3,800 km in the rotating frame of Mars, whose fourth derivative is 3e-6 m/s⁴, a cubic
     /// through nodes 0.67 s apart leaves 3e-8 m.
     pub(super) fn at(&self, late_s: f64) -> SpacecraftState {
-        combined(&self.states, &weights(late_s))
+        combined(&self.states.each_ref(), &weights(late_s))
     }
 }
-
-/// Time between the states of the grid, seconds, and how many of them give a state between.
-const GRID_S: f64 = 4.0;
-const GRID_STATES: usize = 6;
-/// Steps from the first of them to the last one at or before an instant, and to the last.
-const GRID_BEFORE: i64 = 2;
-const GRID_LAST: i64 = 5;
-/// Largest number of a state: of times thirty million years away, which a spoiled record may state.
-const GRID_END: f64 = 2.5e14;
 
 /// States at whole multiples of [`GRID_S`], each computed once for times in order.
 pub(super) struct StateGrid<'a> {
@@ -84,7 +73,7 @@ impl<'a> StateGrid<'a> {
         let late = place - first as f64;
         match self.states {
             [Some(a), Some(b), Some(c), Some(d), Some(e), Some(f)] if self.is_smooth => {
-                Some(combined(&[a, b, c, d, e, f], &grid_weights(late)))
+                Some(combined(&[&a, &b, &c, &d, &e, &f], &grid_weights(late)))
             }
             _ => state(at, self.trajectory),
         }
@@ -113,40 +102,6 @@ impl<'a> StateGrid<'a> {
     }
 }
 
-/// Weights of the states of the grid in the polynomial through them, `late` steps after the first.
-fn grid_weights(late: f64) -> [f64; GRID_STATES] {
-    let from: [f64; GRID_STATES] = std::array::from_fn(|node| late - node as f64);
-    let [a, b, c, d, e, f] = from;
-    let (abc, def) = (a * b * c, d * e * f);
-    [
-        b * c * def / -120.0,
-        a * c * def / 24.0,
-        a * b * def / -12.0,
-        abc * e * f / 12.0,
-        abc * d * f / -24.0,
-        abc * d * e / 120.0,
-    ]
-}
-
-/// Sum of states with these weights, which add up to 1.
-fn combined<const N: usize>(states: &[SpacecraftState; N], weights: &[f64; N]) -> SpacecraftState {
-    let (mut position_m, mut axes) = (Vector3::zeros(), Matrix3::zeros());
-    for (state, weight) in states.iter().zip(weights) {
-        position_m += *weight * state.position.xyz_m;
-        axes += *weight * state.axes;
-    }
-    SpacecraftState {
-        position: Position::new(position_m),
-        axes,
-    }
-}
-
-/// The state at one instant.
-pub(super) fn state(at: Et, trajectory: &Trajectory) -> Option<SpacecraftState> {
-    let (position, velocity_m_s) = trajectory.state(at)?;
-    Some(SpacecraftState::of(at, &position, &velocity_m_s))
-}
-
 /// Weights of the states in the cubic through them.
 fn weights(late_s: f64) -> [f64; 4] {
     let [a, b, c, d] = NODES_S.map(|node_s| late_s - node_s);
@@ -172,20 +127,6 @@ mod tests {
                 .map(|(node_s, weight)| weight * cubic(*node_s))
                 .sum();
             assert!((through - cubic(late_s)).abs() < 1e-14); // rounding
-        }
-    }
-
-    #[test]
-    fn polynomials_of_the_fifth_degree_are_met_by_the_weights_of_the_grid() {
-        for degree in 0..6 {
-            for late in [0.0, 2.0, 2.3, 2.9, 3.0, 5.0] {
-                let through: f64 = grid_weights(late)
-                    .iter()
-                    .enumerate()
-                    .map(|(node, weight)| weight * (node as f64).powi(degree))
-                    .sum();
-                assert!((through - late.powi(degree)).abs() < 1e-11); // rounding of numbers up to 3,125
-            }
         }
     }
 }

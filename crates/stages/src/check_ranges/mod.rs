@@ -20,7 +20,7 @@ use std::sync::atomic::AtomicBool;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::{convert_datum::Converted, group_profiles::Profile};
+use super::{convert_datum::Converted, group_profiles::Profile, spacecraft_grid::SpacecraftGrid};
 use areograph_base::{
     altimetry::MolaClock,
     column::Column,
@@ -32,7 +32,7 @@ use areograph_base::{
 };
 use areograph_config::RangeCheckConfig;
 use areograph_geom::{
-    range_residuals::{RangeResiduals, SpacecraftState},
+    range_residuals::RangeResiduals,
     statistics::{Summary, Trend, outliers},
     surface::NADIR_MAX_RAD,
 };
@@ -76,7 +76,7 @@ stage_inputs! {
 
 impl Stage for CheckRanges<'_> {
     const NAME: &'static str = "check_ranges";
-    const METHOD: u32 = 15;
+    const METHOD: u32 = 16;
     type Output = RangeCheck;
     stage_inputs!(fingerprint);
 
@@ -324,11 +324,12 @@ fn check_profile(
     clock: &MolaClock,
     limits: &RangeCheckConfig,
 ) -> Result<(ShotResiduals, ProfileRanges)> {
+    let reach_s = trajectory_reach_s(limits, clock);
+    let grid = SpacecraftGrid::over(trajectory, profile.interval.padded(reach_s));
     let residuals = |row: &u32| {
         let shot = footprints.row(*row as usize);
         let at = clock.spacecraft_time(shot.et_tag_s);
-        let (position, velocity_m_s) = trajectory.state(at).ok_or(at)?;
-        let spacecraft = SpacecraftState::of(at, &position, &velocity_m_s);
+        let spacecraft = grid.state(at).ok_or(at)?;
         Ok(RangeResiduals::of(&shot, &spacecraft))
     };
     let of_shots: Vec<std::result::Result<RangeResiduals, Et>> =
@@ -348,7 +349,7 @@ fn check_profile(
         .map(|(row, _)| footprints.row(*row as usize))
         .collect();
     shots.outlier = is_outlier.into();
-    let scan = BiasScan::of(&kept, trajectory, limits);
+    let scan = BiasScan::of(&kept, &grid, limits);
     let mut ranges = statistics(profile, &shots, scan, footprints);
     let explain = || orbit::cause(footprints, profile, trajectory, clock, limits.orbit_max_m);
     ranges.invalid_because = ranges

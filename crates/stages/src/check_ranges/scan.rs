@@ -13,6 +13,7 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::spacecraft_grid::SpacecraftGrid;
 use areograph_base::{
     body::Body,
     footprints::Footprint,
@@ -21,11 +22,10 @@ use areograph_base::{
 };
 use areograph_config::{RangeCheckConfig, SCAN_STEPS_MAX};
 use areograph_geom::{
-    body_rotation::{body_rotation, frame_rotation_3, spin_rad_s},
+    body_rotation::body_rotation,
     range_residuals::{footprint, own_spacecraft, range_residual_m},
     statistics::{Trend, mean_and_deviation},
 };
-use areograph_spice::Trajectory;
 
 /// Fewest shots for a meaningful scan.
 const SHOTS_MIN: usize = 10;
@@ -83,9 +83,9 @@ pub struct BiasScan {
 impl BiasScan {
     /// Scans a profile by its shots in IAU 2000, without outliers, in time order; `None` for fewer than ten.
     #[must_use]
-    pub fn of(
+    pub(crate) fn of(
         shots: &[Footprint],
-        trajectory: &Trajectory,
+        grid: &SpacecraftGrid<'_>,
         limits: &RangeCheckConfig,
     ) -> Option<Self> {
         if shots.len() < SHOTS_MIN {
@@ -97,12 +97,11 @@ impl BiasScan {
         let corrections: Vec<f64> = corrections(limits).collect();
         let half_width_s = corrections.last().copied().unwrap_or(0.0);
         let interpolated = match NARROW_S.map(|narrow_s| half_width_s <= narrow_s) {
-            [true, _] => interpolated_spreads_m::<5>(&sighted, trajectory, &corrections),
-            [_, true] => interpolated_spreads_m::<7>(&sighted, trajectory, &corrections),
+            [true, _] => interpolated_spreads_m::<5>(&sighted, grid, &corrections),
+            [_, true] => interpolated_spreads_m::<7>(&sighted, grid, &corrections),
             _ => None,
         };
-        let spreads_m =
-            interpolated.unwrap_or_else(|| spreads_m(&sighted, trajectory, &corrections));
+        let spreads_m = interpolated.unwrap_or_else(|| spreads_m(&sighted, grid, &corrections));
         for (correction_s, spreads_m) in corrections.into_iter().zip(spreads_m) {
             // Corrections beyond the coverage of the kernels are omitted.
             for (scan, spread_m) in [&mut raw, &mut crossover]
@@ -118,7 +117,7 @@ impl BiasScan {
         scan.best_s = best_s(&scan);
         scan.uncertainty_s = scan
             .best_s
-            .and_then(|best_s| uncertainty_s(shots, &sighted, scan.radius, trajectory, best_s));
+            .and_then(|best_s| uncertainty_s(shots, &sighted, scan.radius, grid, best_s));
         Some(scan)
     }
 
@@ -142,10 +141,9 @@ impl BiasScan {
 type Spreads = Vec<Option<[f64; 2]>>;
 
 /// Spreads by the residuals at every correction.
-fn spreads_m(sighted: &[Sighted], trajectory: &Trajectory, corrections: &[f64]) -> Spreads {
+fn spreads_m(sighted: &[Sighted], grid: &SpacecraftGrid<'_>, corrections: &[f64]) -> Spreads {
     let spread_m = |correction_s: &f64| {
-        let turn = turn(*correction_s);
-        let residual = |shot: &Sighted| shot.residuals_m(trajectory, *correction_s, &turn);
+        let residual = |shot: &Sighted| shot.residuals_m(grid, *correction_s);
         let residuals: Option<Vec<[f64; 2]>> = sighted.iter().map(residual).collect();
         residuals.map(|residuals| {
             [0, 1].map(|which| {
@@ -166,7 +164,7 @@ fn spreads_m(sighted: &[Sighted], trajectory: &Trajectory, corrections: &[f64]) 
 /// `None` for a scan of few steps, or kernels that do not cover every node.
 fn interpolated_spreads_m<const NODES: usize>(
     sighted: &[Sighted],
-    trajectory: &Trajectory,
+    grid: &SpacecraftGrid<'_>,
     corrections: &[f64],
 ) -> Option<Spreads> {
     let half_width_s = corrections.last().copied()?;
@@ -176,11 +174,10 @@ fn interpolated_spreads_m<const NODES: usize>(
     let nodes_s: [f64; NODES] = std::array::from_fn(|node| {
         -half_width_s * (std::f64::consts::PI * node as f64 / (NODES - 1) as f64).cos()
     });
-    let turns = nodes_s.map(turn);
     let at_nodes = |shot: &Sighted| {
         let mut residuals_m = [[0.0; NODES]; 2];
-        for (node, (correction_s, turn)) in nodes_s.iter().zip(&turns).enumerate() {
-            let of_node = shot.residuals_m(trajectory, *correction_s, turn)?;
+        for (node, correction_s) in nodes_s.iter().enumerate() {
+            let of_node = shot.residuals_m(grid, *correction_s)?;
             residuals_m[0][node] = of_node[0];
             residuals_m[1][node] = of_node[1];
         }
@@ -229,45 +226,28 @@ fn lagrange_weights<const NODES: usize>(nodes: &[f64; NODES], at: f64) -> [f64; 
     })
 }
 
-/// Rotation of Mars during a correction.
-fn turn(correction_s: f64) -> Matrix3<f64> {
-    frame_rotation_3(spin_rad_s(Body::Mars.model()).z * correction_s)
-}
-
 /// The quantities of a shot that do not depend on the correction.
 struct Sighted {
     tag: Et,
     range_m: f64,
     /// With the raw and the corrected radius.
     footprints: [Position<BodyFixed>; 2],
-    /// From J2000 to Mars at the tag.
-    to_mars: Matrix3<f64>,
 }
 
 impl Sighted {
     fn of(shot: &Footprint) -> Self {
-        let tag = Et::from_seconds(shot.et_tag_s);
+        let direction = footprint(shot, 1.0).xyz_m;
         Self {
-            tag,
+            tag: Et::from_seconds(shot.et_tag_s),
             range_m: shot.range_m,
             footprints: [shot.radius_m, shot.radius_crossover_m]
-                .map(|radius_m| footprint(shot, radius_m)),
-            to_mars: *body_rotation(Body::Mars, tag).matrix(),
+                .map(|radius_m| Position::new(radius_m * direction)),
         }
     }
 
     /// Range − distance to both footprints.
-    ///
-    /// * `turn` – rotation of Mars during the correction: within seconds its axis moves by less than 1e-6 m on the
-    ///   ground
-    fn residuals_m(
-        &self,
-        trajectory: &Trajectory,
-        correction_s: f64,
-        turn: &Matrix3<f64>,
-    ) -> Option<[f64; 2]> {
-        let position = trajectory.position(self.tag.plus(correction_s))?;
-        let spacecraft = Position::new(turn * (self.to_mars * position.xyz_m));
+    fn residuals_m(&self, grid: &SpacecraftGrid<'_>, correction_s: f64) -> Option<[f64; 2]> {
+        let spacecraft = grid.position(self.tag.plus(correction_s))?;
         let footprints = self.footprints.each_ref();
         Some(footprints.map(|of| range_residual_m(self.range_m, &spacecraft, of)))
     }
@@ -323,11 +303,10 @@ fn uncertainty_s(
     shots: &[Footprint],
     sighted: &[Sighted],
     radius: ScannedRadius,
-    trajectory: &Trajectory,
+    grid: &SpacecraftGrid<'_>,
     best_s: f64,
 ) -> Option<f64> {
     let corrections_s = [best_s - RATE_STEP_S, best_s, best_s + RATE_STEP_S];
-    let turns = corrections_s.map(turn);
     let which = radius as usize;
     let mut residuals_m = Vec::with_capacity(shots.len());
     let mut rates_m_s = Vec::with_capacity(shots.len());
@@ -336,16 +315,18 @@ fn uncertainty_s(
     let mut sighted_differences_m = Vec::with_capacity(shots.len());
     for (shot, sighted) in shots.iter().zip(sighted) {
         let residual = |step: usize| {
-            let residuals = sighted.residuals_m(trajectory, corrections_s[step], &turns[step]);
+            let residuals = sighted.residuals_m(grid, corrections_s[step]);
             residuals.map(|of| of[which])
         };
         let change_m = residual(2)? - residual(0)?;
         residuals_m.push(residual(1)?);
         rates_m_s.push(change_m / (2.0 * RATE_STEP_S));
-        let (position, velocity_m_s) = trajectory.state(sighted.tag.plus(best_s))?;
-        let to_mars = turns[1] * sighted.to_mars;
-        let to_track = track_axes(&position.xyz_m, &velocity_m_s).transpose() * to_mars.transpose();
-        let spacecraft_m = to_mars * position.xyz_m;
+        let at = sighted.tag.plus(best_s);
+        let (position, velocity_m_s) = grid.trajectory().state(at)?;
+        let to_mars = body_rotation(Body::Mars, at);
+        let to_track =
+            track_axes(&position.xyz_m, &velocity_m_s).transpose() * to_mars.matrix().transpose();
+        let spacecraft_m = to_mars.apply(&position).xyz_m;
         let ground_m = sighted.footprints[which].xyz_m;
         let sight = (spacecraft_m - ground_m).normalize();
         let direction = to_track * sight;

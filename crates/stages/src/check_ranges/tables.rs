@@ -14,7 +14,10 @@ use super::{
     ProfileRanges, RangeCheck, ShotResiduals, TRAJECTORY_TOLERANCE_M, statistics,
     trajectory_reach_s,
 };
-use crate::{convert_datum::Converted, group_profiles::Profile, tag_times::ImageTimes};
+use crate::{
+    convert_datum::Converted, group_profiles::Profile, spacecraft_grid::state,
+    tag_times::ImageTimes,
+};
 use areograph_base::{
     altimetry::MolaClock,
     body::Body,
@@ -170,10 +173,7 @@ impl Spacecraft<'_> {
     /// The spacecraft at an instant, if known: by an image, else by the kernels.
     fn state(&self, at: Et) -> Option<SpacecraftState> {
         let of_image = self.images.iter().find_map(|image| of_image(image, at));
-        of_image.or_else(|| {
-            let (position, velocity_m_s) = self.kernels?.state(at)?;
-            Some(SpacecraftState::of(at, &position, &velocity_m_s))
-        })
+        of_image.or_else(|| state(at, self.kernels?))
     }
 }
 

@@ -17,4 +17,5 @@ pub mod oriented;
 pub(crate) mod raster;
 pub mod shot_heights;
 pub mod site_image;
+pub(crate) mod spacecraft_grid;
 pub(crate) mod turn;
