@@ -143,7 +143,7 @@ fn encoded(
         DataType::Struct(parts) => parts
             .iter()
             .fold(properties, |of, part| encoded(of, part, &path)),
-        DataType::Float64 => plain(properties, Encoding::BYTE_STREAM_SPLIT),
+        DataType::Float64 | DataType::Float32 => plain(properties, Encoding::BYTE_STREAM_SPLIT),
         DataType::UInt32 | DataType::Timestamp(..) => {
             plain(properties, Encoding::DELTA_BINARY_PACKED)
         }

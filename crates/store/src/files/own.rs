@@ -171,9 +171,9 @@ fn list_of(path: &Path) -> PathBuf {
 }
 
 /// The line of a file in the list.
-fn line_of(mut file: &File, path: &Path) -> io::Result<String> {
+fn line_of(file: &File, path: &Path) -> io::Result<String> {
     let mut hasher = blake3::Hasher::new();
-    io::copy(&mut file, &mut hasher)?;
+    hasher.update_reader(file)?;
     let name = path.file_name().unwrap_or(OsStr::new(""));
     // Escaped: a name may hold a line break.
     let name = name.to_string_lossy();
