@@ -1,7 +1,7 @@
 //! Results of a campaign from the published products of its sites.
 
 use std::{
-    collections::{BTreeMap, BTreeSet},
+    collections::BTreeMap,
     fmt::Write as _,
     path::{Path, PathBuf},
 };
@@ -81,7 +81,7 @@ pub fn publish_results(
     let folder = out.join(CAMPAIGN);
     let _lock = SiteLock::take(&folder)?;
     let mut rows = rows_of(out, sites);
-    mark_repeated(&mut rows);
+    rows.mark_repeated();
     let summary = pool_sites(name, &rows);
     let page = campaign_page(&summary, &rows)?;
     let staging = staging(&folder)?;
@@ -184,16 +184,6 @@ fn in_one_line(out: &Path, text: &str) -> String {
         }
     }
     line
-}
-
-/// Marks pairs whose images an earlier row of a valid site has.
-fn mark_repeated(rows: &mut CampaignRows) {
-    let mut seen: BTreeSet<[String; 2]> = BTreeSet::new();
-    for pair in rows.pairs.iter_mut().filter(|pair| pair.is_valid) {
-        let mut images = pair.images.clone();
-        images.sort_unstable();
-        pair.is_repeated = !seen.insert(images);
-    }
 }
 
 /// The manifest without products.

@@ -58,6 +58,12 @@ fn exposure<'a>() -> Vec<Column<&'a ImageRow>> {
             |row: &Row| row.is_valid,
         ),
         column(
+            "is_repeated",
+            Unit::None,
+            "whether an earlier row of a valid site is of the same image: an image is pooled once",
+            |row: &Row| row.is_repeated,
+        ),
+        column(
             "image",
             Unit::None,
             "identifier of the image",

@@ -75,6 +75,12 @@ fn names<'a>() -> Vec<Column<&'a ProfileRow>> {
             |row: &Row| row.is_valid,
         ),
         column(
+            "is_repeated",
+            Unit::None,
+            "whether another row counts for this orbit, of a valid site with a common image: a profile is pooled once",
+            |row: &Row| row.is_repeated,
+        ),
+        column(
             "profile",
             Unit::None,
             "identifier of the profile: window, orbit and crossing",

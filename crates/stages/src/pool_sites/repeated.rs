@@ -1,25 +1,52 @@
-//! Images and profiles that several sites of a campaign have.
+//! Pairs, images and profiles that several sites of a campaign have: each counts once.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::rows::{CampaignRows, ImageRow, ProfileRow};
 
 impl CampaignRows {
-    /// The images of valid sites, each once.
-    #[must_use]
-    pub fn pooled_images(&self) -> Vec<&ImageRow> {
-        let mut seen: BTreeSet<&str> = BTreeSet::new();
-        let valid = self.images.iter().filter(|image| image.is_valid);
-        valid.filter(|image| seen.insert(&image.image)).collect()
-    }
-
-    /// The profiles of valid sites, each once, in the order of their rows.
+    /// Marks the rows of valid sites whose pair, image or profile another row of a valid site has.
     ///
     /// Windows of sites with a common image have its outline in common, and with it shots of every orbit that crosses it:
     /// of such sites, one counts for each orbit, and one whose window has the image of this orbit precedes others. Sites that
     /// overlap without a common image may still have shots in common, which rows do not show.
+    pub fn mark_repeated(&mut self) {
+        let mut pairs: BTreeSet<[String; 2]> = BTreeSet::new();
+        for pair in self.pairs.iter_mut().filter(|pair| pair.is_valid) {
+            let mut images = pair.images.clone();
+            images.sort_unstable();
+            pair.is_repeated = !pairs.insert(images);
+        }
+        let first = self.first_profiles();
+        for (at, row) in self.profiles.iter_mut().enumerate() {
+            row.is_repeated = row.is_valid && !first.contains(&at);
+        }
+        let mut images: BTreeSet<&str> = BTreeSet::new();
+        for row in self.images.iter_mut().filter(|row| row.is_valid) {
+            row.is_repeated = !images.insert(&row.image);
+        }
+    }
+
+    /// The images of valid sites, each once.
+    #[must_use]
+    pub fn pooled_images(&self) -> Vec<&ImageRow> {
+        let images = self.images.iter();
+        images
+            .filter(|row| row.is_valid && !row.is_repeated)
+            .collect()
+    }
+
+    /// The profiles of valid sites, each once, in the order of their rows.
     #[must_use]
     pub fn pooled_profiles(&self) -> Vec<&ProfileRow> {
+        let profiles = self.profiles.iter();
+        profiles
+            .filter(|row| row.is_valid && !row.is_repeated)
+            .collect()
+    }
+
+    /// Places of the rows of valid profiles that count.
+    fn first_profiles(&self) -> BTreeSet<usize> {
         let mut images: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
         for image in &self.images {
             images.entry(&image.site).or_default().insert(&image.image);
@@ -44,7 +71,6 @@ impl CampaignRows {
                 }
             }
         }
-        let places: BTreeSet<usize> = counted.into_values().flatten().collect();
-        places.into_iter().map(|at| &self.profiles[at]).collect()
+        counted.into_values().flatten().collect()
     }
 }

@@ -105,6 +105,8 @@ pub struct ImageRow {
     pub verdict: &'static str,
     /// Whether the site is valid.
     pub is_valid: bool,
+    /// Whether an earlier site of the campaign has the same image: an image counts once.
+    pub is_repeated: bool,
     /// Identifier.
     pub image: String,
     /// Mission phase; empty where unknown.
@@ -278,6 +280,8 @@ pub struct ProfileRow {
     pub verdict: &'static str,
     /// Whether the site is valid.
     pub is_valid: bool,
+    /// Whether another site with a common image has the profile of the same orbit: one counts.
+    pub is_repeated: bool,
     /// Mission phase of the simultaneous image, or else of the first image of the site; empty where unknown.
     pub phase: String,
     /// Identifier.

@@ -172,6 +172,7 @@ fn profile(site: &str, orbit: u32, image: &str, shots: u32) -> ProfileRow {
         site: site.to_owned(),
         verdict: "valid",
         is_valid: true,
+        is_repeated: false,
         phase: "E02".to_owned(),
         profile: format!("window/{orbit}"),
         orbit,
@@ -222,6 +223,13 @@ fn images_and_profiles_of_several_sites_count_once() {
     };
     rows.images[0].is_valid = false;
     rows.profiles[0].is_valid = false;
+    rows.mark_repeated();
+    // Of the profiles of orbit 1, the one of the site with its image; rows that are not valid are not repetitions.
+    let repeated = rows.profiles.iter().map(|row| row.is_repeated);
+    assert_eq!(
+        repeated.collect::<Vec<_>>(),
+        [false, true, false, false, false, true, true, false]
+    );
     let found = pool_sites("test", &rows);
     assert_eq!((found.image_rows, found.images.images), (6, 3));
     let ranges = found.ranges.unwrap();
