@@ -8,6 +8,13 @@ use rayon::prelude::*;
 const BLOCK: usize = 64;
 /// Right-hand sides that one task solves.
 const COLUMNS: usize = 64;
+/// Least operations of a task, about a millisecond: to give a smaller one to another thread takes as long as to do it.
+const TASK_OPERATIONS: usize = 1 << 25;
+
+/// Pieces of a task, from the operations of one.
+const fn pieces_of_a_task(operations: usize) -> usize {
+    TASK_OPERATIONS / (operations + 1) + 1
+}
 
 /// `L` of `A = L Lᵀ`. The same bits with any number of threads.
 ///
@@ -41,7 +48,9 @@ impl BlockedCholesky {
                 .view_mut((rest, start), (rows - rest, size))
                 .copy_from(&below);
             inverses.push(inverse);
-            let columns = matrix.as_mut_slice()[rest * rows..].par_chunks_mut(BLOCK * rows);
+            let columns = matrix.as_mut_slice()[rest * rows..]
+                .par_chunks_mut(BLOCK * rows)
+                .with_min_len(pieces_of_a_task(2 * BLOCK * BLOCK * (rows - rest)));
             columns.enumerate().for_each(|(index, columns)| {
                 let first = index * BLOCK;
                 let width = columns.len() / rows;
@@ -123,7 +132,10 @@ impl BlockedCholesky {
 /// Works on the columns of `b`, some at a time, on all threads.
 fn in_pieces(b: &mut DMatrix<f64>, work: impl Fn(DMatrixViewMut<'_, f64>) + Sync) {
     let rows = b.nrows();
-    let pieces = b.as_mut_slice().par_chunks_mut(COLUMNS * rows.max(1));
+    let pieces = b
+        .as_mut_slice()
+        .par_chunks_mut(COLUMNS * rows.max(1))
+        .with_min_len(pieces_of_a_task(COLUMNS * rows * rows));
     pieces.for_each(|columns| {
         let width = columns.len() / rows;
         work(DMatrixViewMut::from_slice(columns, rows, width));
@@ -138,7 +150,10 @@ pub(crate) fn add_square(sum: &mut DMatrix<f64>, factor: f64, rows: &DMatrix<f64
     }
     // `tr_mul` takes seven times as long as a product with the transpose.
     let transposed = rows.transpose();
-    let columns = sum.as_mut_slice().par_chunks_mut(BLOCK * size);
+    let columns = sum
+        .as_mut_slice()
+        .par_chunks_mut(BLOCK * size)
+        .with_min_len(pieces_of_a_task(2 * BLOCK * size * rows.nrows()));
     columns.enumerate().for_each(|(index, columns)| {
         let first = index * BLOCK;
         let width = columns.len() / size;

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::{
     HeightControl, HeightResidual,
-    layout::{Layout, Linearised},
+    layout::{Layout, Linearised, OF_A_TASK},
     point_rows::PointRows,
 };
 use crate::pushbroom::ExteriorOrientation;
@@ -50,6 +50,7 @@ pub(super) fn compared<M: ExteriorOrientation>(
         })
     };
     let residuals = (0..points.len()).into_par_iter();
+    let residuals = residuals.with_min_len(OF_A_TASK);
     let residuals = residuals.map_init(PointRows::default, residual);
     residuals
         .collect::<Vec<_>>()

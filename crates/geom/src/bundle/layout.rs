@@ -18,6 +18,9 @@ use crate::{
     robust::RobustWeight,
 };
 
+/// Fewest points or views of a task: to give fewer of them to another thread takes as long as to compute them.
+pub(super) const OF_A_TASK: usize = 256;
+
 /// A point whose rows determine one direction this much worse than another is undetermined.
 const DIRECTION_RATIO_MIN: f64 = 1e-6;
 
@@ -153,7 +156,9 @@ impl<'a, M: ExteriorOrientation> Layout<'a, M> {
     /// The rows of all views at `state`.
     pub(super) fn linearise(&self, state: State) -> Linearised {
         let views = (0..self.network.views.len()).into_par_iter();
-        let views = views.map(|index| self.view_rows(&state, index));
+        let views = views
+            .with_min_len(OF_A_TASK)
+            .map(|index| self.view_rows(&state, index));
         Linearised {
             views: views.collect(),
             state,

@@ -12,7 +12,7 @@ use super::{
     factor::Factor,
     groups::PointGroups,
     heights::Heights,
-    layout::{Layout, Linearised},
+    layout::{Layout, Linearised, OF_A_TASK},
     point_rows::PointRows,
     quality,
     quasi_newton::QuasiNewton,
@@ -72,6 +72,7 @@ pub fn solve_comparing<M: ExteriorOrientation>(
     let start = layout.linearise(State::new(network, &layout.columns, corrections, initial_m));
     let fitness: Vec<Result<(), PointRejection>> = (0..network.points.len())
         .into_par_iter()
+        .with_min_len(OF_A_TASK)
         .map_init(PointRows::default, |rows, point| {
             layout.fitness(rows, &start, point)
         })
@@ -285,6 +286,7 @@ fn advance<M: ExteriorOrientation>(
     let steps_m: Vec<Vector3<f64>> = groups
         .points
         .par_iter()
+        .with_min_len(OF_A_TASK)
         .map_init(PointRows::default, |rows, point| {
             layout.fill(rows, at, *point).ok()?;
             rows.point_step_m(shared)

@@ -7,7 +7,7 @@ use super::{Placed, SharedErrors, Variogram};
 use crate::blocked_cholesky::{BlockedCholesky, add_square};
 
 /// Fewest places of a task: a smaller one costs less than its start.
-const PLACES_MIN: usize = 16;
+const PLACES_MIN: usize = 64;
 /// Fewest profiles for which a product of matrices is faster than products of their columns.
 const PROFILES_MIN: usize = 8;
 
