@@ -214,7 +214,7 @@ fn serve(served: &Served, mut stream: TcpStream) -> std::io::Result<()> {
     }
 }
 
-fn request_of(stream: &mut TcpStream) -> std::io::Result<Option<Request>> {
+pub(crate) fn request_of(stream: &mut TcpStream) -> std::io::Result<Option<Request>> {
     let mut text = Vec::new();
     let mut byte = [0];
     // The last byte is left: a connection that ends with unread bytes is reset.

@@ -20,6 +20,7 @@ pub(crate) mod case;
 pub(crate) mod daf;
 pub(crate) mod flows;
 pub(crate) mod mission;
+pub(crate) mod object_store;
 pub(crate) mod page;
 pub(crate) mod pair;
 pub(crate) mod products_site;

@@ -3,8 +3,7 @@
 use std::{
     fs::{self, File},
     io::{self, Cursor, Read},
-    net::IpAddr,
-    path::{Path, PathBuf},
+    path::Path,
     sync::Arc,
     time::{Duration, SystemTime},
 };
@@ -18,16 +17,21 @@ use ureq::{
 };
 
 use crate::{
+    address::{mirror, permitted, redirected},
     archives::Archives,
     error::FetchError,
     hashed::hexadecimal,
     headers::{rest_of, wait_of},
+    object_store::{Stored, is_stored},
     part::Meta,
 };
 use areograph_base::error::{Error, IoError, Locate as _};
 
 /// Redirections that are followed one after another.
 const REDIRECTIONS_MAX: u32 = 5;
+
+/// Longest answer of a service, bytes: it names a few files.
+const ANSWER_MAX: u64 = 1 << 20;
 
 /// Asks archives.
 #[derive(Debug, Clone)]
@@ -68,6 +72,52 @@ pub(crate) enum Reply {
     Unchanged,
     /// The part that was to be continued is not one of this file.
     OtherFile,
+}
+
+impl Reply {
+    /// A page that is complete.
+    fn of_page(url: &str, page: String) -> Self {
+        Self::Body(Answer {
+            is_rest: false,
+            meta: Meta {
+                url: url.to_owned(),
+                length: Some(page.len() as u64),
+                ..Meta::default()
+            },
+            is_delimited: true,
+            body: Box::new(Cursor::new(page.into_bytes())),
+        })
+    }
+
+    /// The complete body of an answer as a text.
+    pub(crate) fn text(self, is_page: bool) -> Result<String, Fault> {
+        let Self::Body(answer) = self else {
+            return Err(Fault::Passing(
+                "the answer contains no text".to_owned(),
+                None,
+            ));
+        };
+        let (mut bytes, is_delimited) = (Vec::new(), answer.is_delimited);
+        let read = |bytes: &mut Vec<u8>| -> io::Result<usize> {
+            answer.body.take(ANSWER_MAX).read_to_end(bytes)
+        };
+        let problem = match read(&mut bytes) {
+            Err(error) => error.to_string(),
+            Ok(count) => match answer.meta.length {
+                Some(length) if count as u64 != length => {
+                    format!("the answer has {count} bytes; expected {length}")
+                }
+                _ => {
+                    let text = String::from_utf8_lossy(&bytes).into_owned();
+                    if !is_page || is_delimited || text.to_ascii_lowercase().contains("</html") {
+                        return Ok(text);
+                    }
+                    "the listing ends without </html>, and its length is not stated".to_owned()
+                }
+            },
+        };
+        Err(Fault::Passing(problem, None))
+    }
 }
 
 /// Reasons why there is no answer.
@@ -117,15 +167,25 @@ impl Client {
         if let Some(path) = mirror(url) {
             return of_disk(url, &path);
         }
+        if is_stored(url) && url.ends_with('/') {
+            let page = Stored::at(url)?.page(url, |address| {
+                let response = self.ask(url, &permitted(address)?, ask)?;
+                of_response(url, response, ask)?.text(false)
+            })?;
+            return Ok(Reply::of_page(url, page));
+        }
         of_response(url, self.respond(url, ask)?, ask)
     }
 
     /// The response to a request over HTTP, redirections followed.
     pub(crate) fn respond(&self, url: &str, ask: Ask<'_>) -> Result<Response<ureq::Body>, Fault> {
+        if is_stored(url) {
+            return self.ask(url, &permitted(&Stored::at(url)?.address())?, ask);
+        }
         let mut at = url.to_owned();
         for _ in 0..=REDIRECTIONS_MAX {
             let uri = permitted(&at)?;
-            let response = self.ask(&uri, ask)?;
+            let response = self.ask(&at, &uri, ask)?;
             let status = response.status().as_u16();
             if !matches!(status, 301 | 302 | 303 | 307 | 308) {
                 return Ok(response);
@@ -141,7 +201,8 @@ impl Client {
         redirected(query, &permitted(query)?, result).map(drop)
     }
 
-    fn ask(&self, uri: &Uri, ask: Ask<'_>) -> Result<Response<ureq::Body>, Fault> {
+    /// * `url` – the address in messages
+    fn ask(&self, url: &str, uri: &Uri, ask: Ask<'_>) -> Result<Response<ureq::Body>, Fault> {
         let mut request = self.agent.get(uri).header("accept-encoding", "identity");
         if let (1.., Some(validator)) = (ask.from, ask.validator) {
             request = request
@@ -165,13 +226,13 @@ impl Client {
         request.call().map_err(|error| {
             let problem = error.to_string();
             match error {
-                ureq::Error::BadUri(_) | ureq::Error::Http(_) => FetchError::Address {
-                    url: uri.to_string(),
+                ureq::Error::BadUri(_) | ureq::Error::Http(_) => {
+                    let url = url.to_owned();
+                    FetchError::Address { url }.into()
                 }
-                .into(),
                 // Certificates do not become valid by another attempt.
                 ureq::Error::Tls(_) | ureq::Error::Rustls(_) => {
-                    let url = uri.to_string();
+                    let url = url.to_owned();
                     FetchError::Network {
                         url,
                         problem,
@@ -183,12 +244,6 @@ impl Client {
             }
         })
     }
-}
-
-/// The path of a mirror on a disk; a relative one has no meaning in an address.
-pub(crate) fn mirror(url: &str) -> Option<PathBuf> {
-    let path = url.strip_prefix("file://")?;
-    path.starts_with('/').then(|| PathBuf::from(path))
 }
 
 fn of_disk(url: &str, path: &Path) -> Result<Reply, Fault> {
@@ -208,16 +263,7 @@ fn of_disk(url: &str, path: &Path) -> Result<Reply, Fault> {
             let page = page_of(path)
                 .map_err(IoError::on("list folder"))
                 .in_file(path)?;
-            Ok(Reply::Body(Answer {
-                is_rest: false,
-                meta: Meta {
-                    url: url.to_owned(),
-                    length: Some(page.len() as u64),
-                    ..Meta::default()
-                },
-                is_delimited: true,
-                body: Box::new(Cursor::new(page.into_bytes())),
-            }))
+            Ok(Reply::of_page(url, page))
         }
         Ok(_) => Err(FetchError::Status {
             url: url.to_owned(),
@@ -256,57 +302,6 @@ fn page_of(folder: &Path) -> io::Result<String> {
     }
     rows.sort();
     Ok(rows.concat())
-}
-
-/// The address, if its scheme is one to fetch from.
-fn permitted(url: &str) -> Result<Uri, FetchError> {
-    let refused = || FetchError::Address {
-        url: url.to_owned(),
-    };
-    let uri: Uri = url.parse().map_err(|_| refused())?;
-    let host = uri.host().unwrap_or_default();
-    let own = || {
-        host == "localhost"
-            || host
-                .trim_matches(['[', ']'])
-                .parse()
-                .is_ok_and(|ip: IpAddr| ip.is_loopback())
-    };
-    match uri.scheme_str() {
-        Some("https") if !host.is_empty() => Ok(uri),
-        Some("http") if own() => Ok(uri),
-        _ => Err(refused()),
-    }
-}
-
-/// Target of a redirection: https, or the same scheme and host.
-fn redirected(from: &str, uri: &Uri, location: &str) -> Result<String, FetchError> {
-    let refused = |why| FetchError::Redirect {
-        url: from.to_owned(),
-        to: location.to_owned(),
-        why,
-    };
-    let (scheme, host) = (uri.scheme_str().unwrap_or_default(), uri.authority());
-    let base = format!("{scheme}://{}", host.map_or("", |host| host.as_str()));
-    let to = if location.is_empty() {
-        return Err(refused("it names no address"));
-    } else if location.contains("://") {
-        location.to_owned()
-    } else if location.starts_with("//") {
-        format!("{scheme}:{location}")
-    } else if location.starts_with('/') {
-        format!("{base}{location}")
-    } else {
-        let folder = uri.path().rsplit_once('/').map_or("", |(folder, _)| folder);
-        format!("{base}{folder}/{location}")
-    };
-    let to_uri: Uri = to.parse().map_err(|_| refused("it is not an address"))?;
-    match (scheme, to_uri.scheme_str()) {
-        (_, Some("https")) => Ok(to),
-        ("http", Some("http")) if to_uri.authority() == host => Ok(to),
-        ("https", Some("http")) => Err(refused("it gives up encryption")),
-        _ => Err(refused("expected https, or the same host")),
-    }
 }
 
 pub(crate) fn header<'a>(response: &'a Response<ureq::Body>, name: &str) -> Option<&'a str> {
@@ -369,59 +364,4 @@ fn of_response(url: &str, response: Response<ureq::Body>, ask: Ask<'_>) -> Resul
         meta,
         body: Box::new(response.into_body().into_reader()),
     }))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn only_encrypted_and_own_addresses_are_asked() {
-        for good in [
-            "https://a.gov/x",
-            "http://127.0.0.1:80/x",
-            "http://localhost/x",
-            "http://[::1]:8/x",
-        ] {
-            assert!(permitted(good).is_ok(), "{good}");
-        }
-        for bad in [
-            "http://a.gov/x",
-            "ftp://a.gov/x",
-            "https:///x",
-            "x",
-            "http://127.0.0.1.a.gov/",
-            "",
-        ] {
-            assert!(permitted(bad).is_err(), "{bad}");
-        }
-    }
-
-    #[test]
-    fn redirections_keep_to_encryption_or_to_the_host() {
-        let to = |from: &str, location: &str| {
-            redirected(from, &from.parse().unwrap(), location).map_err(|error| error.to_string())
-        };
-        assert_eq!(to("https://a.gov/x/y", "z").unwrap(), "https://a.gov/x/z");
-        assert_eq!(
-            to("https://a.gov/x", "//b.gov/z").unwrap(),
-            "https://b.gov/z"
-        );
-        assert_eq!(
-            to("http://127.0.0.1:8/x", "https://b.gov/z").unwrap(),
-            "https://b.gov/z"
-        );
-        assert_eq!(
-            to("http://127.0.0.1:8/x", "/z").unwrap(),
-            "http://127.0.0.1:8/z"
-        );
-        assert!(
-            to("https://a.gov/x", "http://a.gov/x")
-                .unwrap_err()
-                .contains("gives up encryption")
-        );
-        for other in ["http://b.gov/z", "ftp://b.gov/z", "file:///etc/passwd", ""] {
-            assert!(to("http://127.0.0.1:8/x", other).is_err(), "{other}");
-        }
-    }
 }

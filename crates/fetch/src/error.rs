@@ -33,7 +33,7 @@ pub enum FetchError {
     Nothing,
     /// The archive refuses or does not have a file.
     #[error("{url}: HTTP status {status}")]
-    #[cause(Io: "{}", advice_on(*status))]
+    #[cause(Io: "{}", advice_on_object(url, *status).unwrap_or_else(|| advice_on(*status)))]
     Status {
         /// Address.
         url: String,
@@ -64,12 +64,22 @@ pub enum FetchError {
     },
     /// An address that is not fetched from.
     #[error(
-        "{url} is not a permitted address; expected https://, file:///, or http:// on this computer"
+        "{url} is not a permitted address; expected https://, s3://, file:///, or http:// on this computer"
     )]
     #[cause(Configuration: "correct the address in the table of archives")]
     Address {
         /// Address.
         url: String,
+    },
+    /// An object store that cannot be asked, or answers otherwise.
+    #[error("{url}: {problem}")]
+    #[cause(Configuration: "correct the address, or the variables of the environment that name the object store: AWS_ENDPOINT_URL_S3, \
+                           AWS_REGION, AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY")]
+    ObjectStore {
+        /// Address.
+        url: String,
+        /// The problem, with what was expected.
+        problem: String,
     },
     /// The received data are not the file.
     #[error("{url}: {problem}")]
@@ -162,6 +172,19 @@ pub enum FetchError {
     #[error("is not a state file of areograph fetch: {0}")]
     #[cause(Input: "move the file away: the next fetch examines all files again")]
     State(String),
+}
+
+/// The advice on a status of an object store, where it differs from that on a server of files.
+pub(crate) fn advice_on_object(url: &str, status: u16) -> Option<&'static str> {
+    match status {
+        _ if !url.starts_with("s3://") => None,
+        301 | 307 => Some("the bucket is in another region: set AWS_REGION"),
+        400 | 401 | 403 => Some(
+            "check AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY and AWS_REGION, the rights of the key, and the clock of this computer; \
+             public buckets are read without a key",
+        ),
+        _ => None,
+    }
 }
 
 fn advice_on(status: u16) -> &'static str {

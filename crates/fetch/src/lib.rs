@@ -23,6 +23,7 @@
 //! # Ok::<(), areograph_base::error::Error>(())
 //! ```
 
+mod address;
 mod answer;
 mod archives;
 pub mod audit;
@@ -35,6 +36,7 @@ mod folder;
 mod hashed;
 mod headers;
 pub mod index;
+mod object_store;
 mod outcome;
 mod page;
 mod part;

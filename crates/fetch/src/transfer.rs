@@ -2,7 +2,7 @@
 
 use std::{
     fs,
-    io::{self, ErrorKind, Read as _},
+    io::{ErrorKind, Read as _},
     path::{Path, PathBuf},
     sync::{
         atomic::AtomicBool,
@@ -30,9 +30,6 @@ use areograph_store::{
 const CHUNK: usize = 1 << 16;
 /// Time between checks for an interrupt by the user during a wait.
 const LOOK: Duration = Duration::from_millis(50);
-/// Longest answer of a service, bytes: it names a few files.
-const ANSWER_MAX: u64 = 1 << 20;
-
 /// A file to receive.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Wanted<'a> {
@@ -157,9 +154,7 @@ impl Receiver<'_> {
                 limit: Some(limit),
                 ..Ask::default()
             };
-            let text = client
-                .get(&url, ask)
-                .and_then(|reply| text_of(reply, is_page));
+            let text = client.get(&url, ask).and_then(|reply| reply.text(is_page));
             // Nothing waits for it after a stop.
             let _ = send.send(text);
         });
@@ -290,36 +285,6 @@ impl Receiver<'_> {
             _ => Ok(()),
         }
     }
-}
-
-/// The complete body of an answer as a text.
-fn text_of(reply: Reply, is_page: bool) -> std::result::Result<String, Fault> {
-    let Reply::Body(answer) = reply else {
-        return Err(Fault::Passing(
-            "the answer contains no text".to_owned(),
-            None,
-        ));
-    };
-    let (mut bytes, is_delimited) = (Vec::new(), answer.is_delimited);
-    let read = |bytes: &mut Vec<u8>| -> io::Result<usize> {
-        answer.body.take(ANSWER_MAX).read_to_end(bytes)
-    };
-    let problem = match read(&mut bytes) {
-        Err(error) => error.to_string(),
-        Ok(count) => match answer.meta.length {
-            Some(length) if count as u64 != length => {
-                format!("the answer has {count} bytes; expected {length}")
-            }
-            _ => {
-                let text = String::from_utf8_lossy(&bytes).into_owned();
-                if !is_page || is_delimited || text.to_ascii_lowercase().contains("</html") {
-                    return Ok(text);
-                }
-                "the listing ends without </html>, and its length is not stated".to_owned()
-            }
-        },
-    };
-    Err(Fault::Passing(problem, None))
 }
 
 /// The identity of the part, if it matches the wanted file.

@@ -27,7 +27,7 @@ fn lists_and_addresses_are_checked_before_anything_is_written() {
     for (url, expected, code) in [
         ("http://example.org/data/", "expected https://", 2),
         ("https:///data", "not a permitted address", 2),
-        ("file://archive/data", "expected https://, file:///", 2),
+        ("file://archive/data", "s3://, file:///, or http://", 2),
         ("http://127.0.0.1:1/data/", "attempts: 3", 6),
         (
             &format!("{}/nothing", archive.server.url()),

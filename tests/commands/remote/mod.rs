@@ -10,6 +10,7 @@ mod answers;
 mod checks;
 mod incomplete;
 mod indexing;
+mod objects;
 #[cfg(feature = "sql")]
 mod sql;
 

@@ -2,7 +2,7 @@
 
 use areograph_base::error::{Cause, Error};
 
-use crate::error::FetchError;
+use crate::error::{FetchError, advice_on_object};
 
 /// Reasons why bytes of a file on a server cannot be used.
 #[derive(Debug, thiserror::Error, Cause)]
@@ -35,7 +35,7 @@ pub enum RemoteError {
     },
     /// The server refuses or does not have the file.
     #[error("{url}: HTTP status {status}")]
-    #[cause(Io: "{}", advice_on(*status))]
+    #[cause(Io: "{}", advice_on_object(url, *status).unwrap_or_else(|| advice_on(*status)))]
     Status {
         /// Address.
         url: String,

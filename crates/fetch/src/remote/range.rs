@@ -10,7 +10,8 @@ use std::{
 
 use super::error::RemoteError;
 use crate::{
-    client::{Ask, Fault, header, mirror, refused},
+    address::mirror,
+    client::{Ask, Fault, header, refused},
     error::FetchError,
     headers::{range_of, wait_of},
     transfer::Receiver,
