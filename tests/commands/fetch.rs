@@ -21,6 +21,7 @@ use crate::common::{
     archive_server::{ArchiveServer, Fault, Listing, md5_of, write, write_kernels},
     json,
     mission::areograph,
+    object_store::ObjectStore,
 };
 
 /// Bytes without a pattern that a wrong piece could repeat.
@@ -901,6 +902,24 @@ fn a_mirror_on_a_disk_serves_as_an_archive_does() {
     );
     let (code, told) = archive.refused(&["--only", "pedr"]);
     assert!(code == 2 && told.contains("unknown field"), "{told}");
+}
+
+#[test]
+fn a_mirror_in_an_object_store_serves_as_an_archive_does() {
+    let archive = Archive::new(Listing::Plain);
+    let store = ObjectStore::of(&archive.path("archive"));
+    let hosts = fs::read_to_string(archive.path("hosts.toml")).unwrap();
+    let hosts = hosts.replace(&archive.server.url(), "s3://mola");
+    fs::write(archive.path("hosts.toml"), hosts).unwrap();
+    for arguments in [&DAYS[..], &["--generic-kernels", "generic"]] {
+        let mut command = store.named_by(archive.command(arguments), "KEY");
+        let output = command.current_dir(archive.folder.path()).output().unwrap();
+        assert!(output.status.success(), "{:?}", texts(&output));
+    }
+    let kernel = fs::read(archive.path("mars/kernels/mgs_ext1.bsp")).unwrap();
+    assert!(kernel == archive.original(KERNEL_PATH));
+    assert_eq!(files(&archive.path("generic")), ["naif0012.tls"]);
+    assert_eq!(archive.server.request_count(), 0);
 }
 
 /// A row of the index: an image 3 km wide and 10 km high around a place, west longitude as the index has it.

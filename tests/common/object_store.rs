@@ -7,6 +7,7 @@ use std::{
     io::{Read as _, Write as _},
     net::{TcpListener, TcpStream},
     path::{Path, PathBuf},
+    process::Command,
     sync::{Arc, Mutex},
     thread,
 };
@@ -40,8 +41,17 @@ impl ObjectStore {
         Self { requests, port }
     }
 
-    pub(crate) fn url(&self) -> String {
+    fn url(&self) -> String {
         format!("http://127.0.0.1:{}", self.port)
+    }
+
+    /// A command whose environment names the store.
+    pub(crate) fn named_by(&self, mut command: Command, key: &str) -> Command {
+        command
+            .env("AWS_ENDPOINT_URL_S3", self.url())
+            .env("AWS_ACCESS_KEY_ID", key)
+            .env("AWS_SECRET_ACCESS_KEY", "HIDDEN");
+        command
     }
 
     /// Targets of all requests, in order.

@@ -5,22 +5,13 @@ use std::{fs, process::Command};
 use super::{Archive, FIRST, SECOND, SMALL, failed};
 use crate::common::{archive_server::Listing, mission::succeed, object_store::ObjectStore};
 
-/// The variables of the environment that name the store.
-fn with(mut command: Command, store: &ObjectStore, key: &str) -> Command {
-    command
-        .env("AWS_ENDPOINT_URL_S3", store.url())
-        .env("AWS_ACCESS_KEY_ID", key)
-        .env("AWS_SECRET_ACCESS_KEY", "HIDDEN");
-    command
-}
-
 #[test]
 fn an_object_store_is_read_as_a_server_of_files() {
     let archive = Archive::new(Listing::Plain);
     let root = archive.path("archive");
     let store = ObjectStore::of(&root);
     let url = "s3://mola/data/";
-    let index = |key: &str| with(archive.index_of(url, &["--json"]), &store, key);
+    let index = |key: &str| store.named_by(archive.index_of(url, &["--json"]), key);
     let indexed = || -> serde_json::Value {
         serde_json::from_slice(&succeed(&mut index("KEY")).stdout).unwrap()
     };
@@ -37,7 +28,7 @@ fn an_object_store_is_read_as_a_server_of_files() {
     assert_eq!(listings(&store), 4);
     let of_folder = archive.found("archive/data", SMALL);
     let before = store.requests().len();
-    let mut search = with(archive.search("mola", SMALL, "mola.csv"), &store, "KEY");
+    let mut search = store.named_by(archive.search("mola", SMALL, "mola.csv"), "KEY");
     let stated = succeed(&mut search).stdout;
     assert_eq!(fs::read(archive.path("mola.csv")).unwrap(), of_folder[0]);
     assert!(!stated.is_empty() && store.requests().len() > before);
@@ -97,7 +88,7 @@ fn an_object_store_that_refuses_is_reported_without_signatures() {
             "AWS_ENDPOINT_URL_S3",
         ),
     ] {
-        let (_, error) = refused(with(archive.index_of(url, &[]), &store, key));
+        let (_, error) = refused(store.named_by(archive.index_of(url, &[]), key));
         assert!(
             error.contains(expected) && error.contains(advice),
             "{url}: {error}"
@@ -111,21 +102,17 @@ fn an_object_store_that_refuses_is_reported_without_signatures() {
         ),
         ("AWS_SECRET_ACCESS_KEY", "", "without AWS_SECRET_ACCESS_KEY"),
     ] {
-        let mut command = with(archive.index_of("s3://mola/data/", &[]), &store, "KEY");
+        let mut command = store.named_by(archive.index_of("s3://mola/data/", &[]), "KEY");
         command.env(name, value);
         let (code, error) = refused(command);
         assert!(error.contains(expected) && code == 2, "{error}");
     }
     assert!(!archive.path("mola").exists());
     // An object that is gone after it was indexed.
-    succeed(&mut with(
-        archive.index_of("s3://mola/data/", &[]),
-        &store,
-        "KEY",
-    ));
+    succeed(&mut store.named_by(archive.index_of("s3://mola/data/", &[]), "KEY"));
     fs::remove_file(archive.path("archive").join(FIRST)).unwrap();
     let search = archive.search("mola", SMALL, "gone.csv");
-    let (_, error) = refused(with(search, &store, "KEY"));
+    let (_, error) = refused(store.named_by(search, "KEY"));
     assert!(
         error.contains(&format!("s3://mola/{FIRST}: HTTP status 404")),
         "{error}"
