@@ -51,7 +51,7 @@ stage_inputs! {
 
 impl Stage for SampleOrientation<'_> {
     const NAME: &'static str = "sample_orientation";
-    const METHOD: u32 = 8;
+    const METHOD: u32 = 9;
     type Output = Orientation;
     stage_inputs!(fingerprint);
 
