@@ -1,11 +1,27 @@
 //! Work on several sites at the same time.
 
-use std::sync::{Arc, atomic::AtomicBool};
+use std::{
+    num::NonZero,
+    sync::{Arc, atomic::AtomicBool},
+    thread,
+};
 
 use tokio::{runtime::Runtime, task::JoinSet};
 
 use super::{panicked::flatten, stop::on_signals};
 use crate::error::{IoError, Result};
+
+/// Most pieces of work at a time.
+pub(super) const JOBS_MAX: u16 = 64;
+/// Sites beyond the number of cores: while some wait for the disk, others compute.
+const BEYOND_CORES: usize = 2;
+
+/// The number of sites at a time that the user gave, or else one that keeps all cores busy.
+pub(super) fn jobs_or_default(given: Option<u16>) -> u16 {
+    let cores = thread::available_parallelism().map_or(1, NonZero::get);
+    let jobs = u16::try_from(cores + BEYOND_CORES).unwrap_or(u16::MAX);
+    given.unwrap_or_else(|| jobs.min(JOBS_MAX))
+}
 
 /// Does at most `jobs` pieces of work at a time, begun in their order, and passes the number and result of each to `done`
 /// when it ends. Work is created when it begins, so the memory does not depend on the number of pieces.

@@ -11,7 +11,7 @@ use serde_json::json;
 
 use super::{
     load_sites, open, output, plan,
-    pool::{in_pool, limit_threads},
+    pool::{JOBS_MAX, in_pool, jobs_or_default, limit_threads},
     progress::Progress,
     report,
     single::{RunFlags, stopped_after, untested},
@@ -45,9 +45,10 @@ pub(super) struct Arguments {
     /// Output folder; each site is written to a subfolder.
     #[arg(long, default_value = "out")]
     out: PathBuf,
-    /// Number of sites that run at the same time (SPICE itself serves one at a time).
-    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u16).range(1..=64))]
-    jobs: u16,
+    /// Number of sites that run at the same time (SPICE itself serves one at a time); by default two more than there are
+    /// cores, because sites wait for the disk.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=i64::from(JOBS_MAX)))]
+    jobs: Option<u16>,
     /// Worker threads; by default one per core. Products do not depend on it.
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
@@ -157,9 +158,14 @@ fn run_all(
             run_site(&site, &arguments.options(&stop, &hashes, &progress))
         }
     });
-    in_pool(arguments.jobs, &stop, work, |number, outcome| {
-        outcomes[number] = Some(outcome);
-    })?;
+    in_pool(
+        jobs_or_default(arguments.jobs),
+        &stop,
+        work,
+        |number, outcome| {
+            outcomes[number] = Some(outcome);
+        },
+    )?;
     Ok(outcomes.into_iter().flatten().collect())
 }
 

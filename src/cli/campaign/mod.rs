@@ -17,7 +17,7 @@ use clap::Args;
 
 pub(super) use self::task::{Arguments as TaskArguments, run as run_task};
 use super::{
-    pool::{in_pool, limit_threads},
+    pool::{JOBS_MAX, in_pool, jobs_or_default, limit_threads},
     progress::Progress,
     report,
 };
@@ -56,9 +56,10 @@ pub(super) struct Arguments {
     /// Only these sites.
     #[arg(long, value_name = "SITE", num_args = 1..)]
     only: Vec<String>,
-    /// Number of sites that run at the same time on this machine (SPICE itself serves one at a time).
-    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u16).range(1..=64))]
-    jobs: u16,
+    /// Number of sites that run at the same time on this machine (SPICE itself serves one at a time); by default two more
+    /// than there are cores, because sites wait for the disk.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=i64::from(JOBS_MAX)))]
+    jobs: Option<u16>,
     /// Worker threads; by default one per core. Products do not depend on it.
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
@@ -110,7 +111,12 @@ fn ran(arguments: &Arguments) -> Result<ExitCode> {
     is_selected(&campaign, arguments).in_file(&arguments.file)?;
     if arguments.plan {
         let costs = Costs::read(&arguments.out);
-        answer::plan(&campaign, costs, arguments.jobs, arguments.json);
+        answer::plan(
+            &campaign,
+            costs,
+            jobs_or_default(arguments.jobs),
+            arguments.json,
+        );
         return Ok(ExitCode::SUCCESS);
     }
     check_out(&arguments.out, &[])?;
@@ -217,13 +223,18 @@ fn on_this_machine(
     let progress = Progress::of_work(&campaign.config.campaign);
     let mut ended: Vec<Option<SiteEnd>> = (0..all).map(|_| None).collect();
     let mut done = 0;
-    in_pool(arguments.jobs, &stop, work, |place, result| {
-        done += 1;
-        let of = "sites";
-        let all = all as u64;
-        progress.count("run", Count { done, all, of });
-        let id = &campaign.sites[sites[place]].id;
-        ended[place] = Some(result.unwrap_or_else(|failure| SiteEnd::failed(id, &failure)));
-    })?;
+    in_pool(
+        jobs_or_default(arguments.jobs),
+        &stop,
+        work,
+        |place, result| {
+            done += 1;
+            let of = "sites";
+            let all = all as u64;
+            progress.count("run", Count { done, all, of });
+            let id = &campaign.sites[sites[place]].id;
+            ended[place] = Some(result.unwrap_or_else(|failure| SiteEnd::failed(id, &failure)));
+        },
+    )?;
     Ok(ended.into_iter().flatten().collect())
 }
