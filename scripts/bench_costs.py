@@ -111,8 +111,8 @@ class Bench:
             site.write_text(f"{text}\n[surface]\ncell_m = {cell_m}\n")
             cost = self.run(site)
             surface = next((self.out / "gusev_crater").rglob("surface.json"))
-            counts = json.loads(surface.read_text())
-            self.note("terrain model, edge of a cell in m", int(cell_m), cost, json.dumps(counts.get("cells", ""))[:80])
+            cells = json.loads(surface.read_text())["cells"]["common"]
+            self.note("cells of a terrain model from pixels", cells, cost, f"edge {cell_m:.0f} m")
 
     def archive(self):
         archive = self.folder / "archive"
@@ -204,11 +204,11 @@ def plot(series, path):
     for axis, key, label in zip(axes, ("wall_s", "memory_mib"), ("time, s", "peak memory, MiB")):
         for name, points in shown.items():
             axis.loglog([size for size, _ in points], [getattr(cost, key) for _, cost in points], marker="o", label=name)
-        axis.set_xlabel("number of shots, images, tie points or windows")
+        axis.set_xlabel("number of shots, images, tie points, cells or windows")
         axis.set_ylabel(label)
         axis.grid(True, which="both", alpha=0.3)
-    axes[0].legend(fontsize=7)
-    figure.tight_layout()
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="lower center", ncols=4, fontsize=7)
+    figure.tight_layout(rect=(0, 0.09, 1, 1))
     figure.savefig(path, metadata={"Date": None})
 
 
@@ -225,9 +225,10 @@ def main():
     bench.shots()
     bench.images([3, 10, 30])
     bench.ties([100, 1_000, 10_000])
-    bench.archive()
     if wish.terrain:
         bench.terrain()
+    # Last, because processes inherit the peak memory of this one, which reads all rows.
+    bench.archive()
     if wish.plot:
         plot(bench.series, wish.plot)
 
