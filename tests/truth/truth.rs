@@ -21,6 +21,7 @@ mod flown;
 mod footprint_heights;
 mod light_time;
 mod misregistration;
+mod mistakes;
 mod orbit;
 mod overlays;
 mod parts;
@@ -277,9 +278,13 @@ pub(crate) fn scene(folder: &Path, seed: u32, options: &[&str]) -> PathBuf {
 
 /// The command that runs every site of a mission.
 fn run(mission: &Path, out: &Path) -> Command {
+    run_of(&SITES, mission, out)
+}
+
+fn run_of(sites: &[&str], mission: &Path, out: &Path) -> Command {
     let mut run = areograph();
     run.args(["--quiet", "run"]);
-    for site in SITES {
+    for site in sites {
         run.arg(mission.join(format!("sites/{site}.toml")));
     }
     run.arg("--out").arg(out);

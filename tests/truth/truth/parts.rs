@@ -146,6 +146,8 @@ fn errors_of_one_cause_alone_are_as_large_as_their_part() {
             keys: cause.keys,
             errors: cause.errors,
             files: |_, _| {},
+            sites: &SITES,
+            may_be_refused: false,
         })
         .collect();
     let all = flown(&plans);

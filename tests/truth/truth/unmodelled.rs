@@ -3,7 +3,7 @@
 //!
 //! Seeds begin at 50,000. The long run writes the page with `SNAPSHOTS=overwrite`.
 
-mod changes;
+pub(super) mod changes;
 
 use std::fmt::Write as _;
 

@@ -2,7 +2,7 @@
 
 use super::Evidence;
 use crate::check_ranges::ProfileRanges;
-use areograph_base::minus::signed;
+use areograph_base::{altimetry::GroundRadius, minus::signed};
 use areograph_config::RangeCheckConfig;
 
 /// Short profiles named in a remark; all are counted.
@@ -83,7 +83,56 @@ pub(super) fn remarks(evidence: &Evidence<'_>) -> Vec<String> {
             .iter()
             .filter_map(|profile| far_off(profile, limits)),
     );
+    remarks.extend(corrected_too_far(evidence));
     remarks
+}
+
+/// Crossover corrections of profiles at nadir that are larger than errors of an orbit, which they correct: the ranges, which take
+/// no part in them, confirm the uncorrected radii.
+fn corrected_too_far(evidence: &Evidence<'_>) -> Vec<String> {
+    let limits = evidence.range_limits;
+    if evidence.ground != Some(GroundRadius::Corrected) {
+        return Vec::new();
+    }
+    let correction_m = |of: &ProfileRanges| {
+        let [raw, corrected] = [
+            of.range_minus_distance_m,
+            of.range_minus_distance_crossover_m,
+        ];
+        corrected.mean - raw.mean
+    };
+    // Radii of tables without a spacecraft are corrected already; ranges beyond their own limit confirm nothing.
+    let profiles = evidence.ranges.profiles.iter().filter(|of| {
+        of.is_judged(limits)
+            && !of.is_off_nadir()
+            && of.decoding_m.n > 0
+            && of.range_minus_distance_m.n > 0
+            && of.range_minus_distance_crossover_m.n > 0
+            && of.mean_without_outliers_m.abs() <= limits.mean_max_m
+    });
+    let corrected: Vec<(String, f64)> = profiles
+        .map(|of| (format!("profile {}", of.profile), correction_m(of)))
+        .collect();
+    let count = corrected.len() as f64;
+    let sum_m: f64 = corrected.iter().map(|(_, correction_m)| correction_m).sum();
+    let all = (
+        format!("{count} profiles at nadir, on average"),
+        sum_m / count,
+    );
+    let limit_m = limits.mean_max_m;
+    // The limit is one of single orbits, whose errors are independent.
+    let single = corrected.into_iter().map(|of| (of, limit_m));
+    let tested = single.chain((count > 1.0).then(|| (all, limit_m / count.sqrt())));
+    let far = tested.filter(|((_, correction_m), limit_m)| !(correction_m.abs() <= *limit_m));
+    far.map(|((subject, correction_m), limit_m)| {
+        format!(
+            "{subject}: the crossover correction changes radii by {} m, whereas ranges confirm the uncorrected radii; expected at \
+             most ±{limit_m:.1} m, the limit for an orbit error (range_check.mean_max_m): check the unit of the crossover residuals, \
+             or use uncorrected radii (pedr.crossover)",
+            signed(correction_m, 1)
+        )
+    })
+    .collect()
 }
 
 /// A profile whose mean is beyond the limit, but does not make the site invalid: it is too short, off nadir, or its radii are

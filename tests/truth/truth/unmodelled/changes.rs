@@ -14,14 +14,20 @@ use crate::mutations::make_changes;
 const OFF_NADIR: [&str; 3] = ["ap19019k.b", "ap19043k.b", "ap19802l.b"];
 
 /// Changes a text of every site file.
-pub(super) fn in_sites(case: &Case, from: &str, to: &str) {
+pub(in crate::truth) fn in_sites(case: &Case, from: &str, to: &str) {
     for site in SITES {
         case.replace(&format!("sites/{site}.toml"), from, to);
     }
 }
 
 /// Changes fields of these PEDR files, centimetres; of one frame in `one_in` where it is given.
-fn of_files(case: &Case, files: &[String], fields: &str, number: &str, one_in: Option<u32>) {
+pub(in crate::truth) fn of_files(
+    case: &Case,
+    files: &[String],
+    fields: &str,
+    number: &str,
+    one_in: Option<u32>,
+) {
     let one_in = one_in.map_or_else(String::new, |frames| format!(", one_in = {frames}"));
     make_changes(
         case,
@@ -32,7 +38,7 @@ fn of_files(case: &Case, files: &[String], fields: &str, number: &str, one_in: O
 }
 
 /// The same of all PEDR files.
-pub(super) fn of_shots(case: &Case, fields: &str, number: &str, one_in: Option<u32>) {
+pub(in crate::truth) fn of_shots(case: &Case, fields: &str, number: &str, one_in: Option<u32>) {
     let folder = case.path("pedr").read_dir().unwrap();
     let names = folder.map(|file| file.unwrap().file_name().display().to_string());
     let mut files: Vec<String> = names
