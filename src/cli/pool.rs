@@ -14,13 +14,20 @@ use crate::error::{IoError, Result};
 /// Most pieces of work at a time.
 pub(super) const JOBS_MAX: u16 = 64;
 /// Sites beyond the number of cores: while some wait for the disk, others compute.
-const BEYOND_CORES: usize = 2;
+const BEYOND_CORES: u16 = 2;
 
 /// The number of sites at a time that the user gave, or else one that keeps all cores busy.
-pub(super) fn jobs_or_default(given: Option<u16>) -> u16 {
-    let cores = thread::available_parallelism().map_or(1, NonZero::get);
-    let jobs = u16::try_from(cores + BEYOND_CORES).unwrap_or(u16::MAX);
+///
+/// * `threads` – worker threads, if the user limits them
+pub(super) fn jobs_or_default(given: Option<u16>, threads: Option<u16>) -> u16 {
+    let jobs = cores(threads).saturating_add(BEYOND_CORES);
     given.unwrap_or_else(|| jobs.min(JOBS_MAX))
+}
+
+/// Cores that the user permits to be used.
+pub(super) fn cores(threads: Option<u16>) -> u16 {
+    let all = thread::available_parallelism().map_or(1, NonZero::get);
+    threads.unwrap_or_else(|| u16::try_from(all).unwrap_or(JOBS_MAX).min(JOBS_MAX))
 }
 
 /// Does at most `jobs` pieces of work at a time, begun in their order, and passes the number and result of each to `done`
@@ -73,5 +80,18 @@ pub(super) fn limit_threads(threads: Option<u16>) {
         let _ = rayon::ThreadPoolBuilder::new()
             .num_threads(usize::from(threads))
             .build_global();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sites_at_a_time_follow_the_limits_of_the_user() {
+        assert_eq!(jobs_or_default(Some(7), Some(1)), 7);
+        assert_eq!(jobs_or_default(None, Some(1)), 3);
+        assert_eq!(jobs_or_default(None, Some(1024)), JOBS_MAX);
+        assert!((3..=JOBS_MAX).contains(&jobs_or_default(None, None)));
     }
 }

@@ -45,8 +45,8 @@ pub(super) struct Arguments {
     /// Output folder; each site is written to a subfolder.
     #[arg(long, default_value = "out")]
     out: PathBuf,
-    /// Number of sites that run at the same time (SPICE itself serves one at a time); by default two more than there are
-    /// cores, because sites wait for the disk.
+    /// Number of sites that run at the same time (SPICE itself serves one at a time); by default two more than
+    /// there are cores, at most 64. Memory grows with this number.
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=i64::from(JOBS_MAX)))]
     jobs: Option<u16>,
     /// Worker threads; by default one per core. Products do not depend on it.
@@ -159,7 +159,7 @@ fn run_all(
         }
     });
     in_pool(
-        jobs_or_default(arguments.jobs),
+        jobs_or_default(arguments.jobs, arguments.threads),
         &stop,
         work,
         |number, outcome| {

@@ -47,6 +47,9 @@ impl ObjectStore {
 
     /// A command whose environment names the store.
     pub(crate) fn named_by(&self, mut command: Command, key: &str) -> Command {
+        for name in ["AWS_REGION", "AWS_DEFAULT_REGION", "AWS_SESSION_TOKEN"] {
+            command.env_remove(name);
+        }
         command
             .env("AWS_ENDPOINT_URL_S3", self.url())
             .env("AWS_ACCESS_KEY_ID", key)
@@ -73,7 +76,9 @@ fn serve(root: &Path, made: &Mutex<Vec<String>>, mut stream: TcpStream) -> std::
                 .map(|(_, value)| value.replace("%2F", "/"));
             found.last()
         };
-        let is_signed = value("X-Amz-Credential").is_some_and(|key| key.starts_with("KEY/"))
+        let is_signed = value("X-Amz-Credential").is_some_and(|key| {
+            key.starts_with("KEY/") && key.ends_with("/us-east-1/s3/aws4_request")
+        }) && value("X-Amz-SignedHeaders").is_some_and(|names| names == "host")
             && value("X-Amz-Signature").is_some_and(|signature| signature.len() == 64);
         let key = path.trim_start_matches('/').strip_prefix("mola");
         let body = match key {

@@ -30,8 +30,8 @@ use areograph_base::error::{Error, IoError, Locate as _};
 /// Redirections that are followed one after another.
 const REDIRECTIONS_MAX: u32 = 5;
 
-/// Longest answer of a service, bytes: it names a few files.
-const ANSWER_MAX: u64 = 1 << 20;
+/// Longest answer of a service or listing of a folder, bytes.
+const ANSWER_MAX: u64 = 64 << 20;
 
 /// Asks archives.
 #[derive(Debug, Clone)]
@@ -99,10 +99,17 @@ impl Reply {
         };
         let (mut bytes, is_delimited) = (Vec::new(), answer.is_delimited);
         let read = |bytes: &mut Vec<u8>| -> io::Result<usize> {
-            answer.body.take(ANSWER_MAX).read_to_end(bytes)
+            answer.body.take(ANSWER_MAX + 1).read_to_end(bytes)
         };
         let problem = match read(&mut bytes) {
             Err(error) => error.to_string(),
+            Ok(count) if count as u64 > ANSWER_MAX => {
+                let (url, problem) = (
+                    answer.meta.url,
+                    format!("the answer is longer than {ANSWER_MAX} bytes"),
+                );
+                return Err(FetchError::Content { url, problem }.into());
+            }
             Ok(count) => match answer.meta.length {
                 Some(length) if count as u64 != length => {
                     format!("the answer has {count} bytes; expected {length}")
@@ -169,7 +176,7 @@ impl Client {
         }
         if is_stored(url) && url.ends_with('/') {
             let page = Stored::at(url)?.page(url, |address| {
-                let response = self.ask(url, &permitted(address)?, ask)?;
+                let response = self.ask(url, &signed(url, address)?, ask)?;
                 of_response(url, response, ask)?.text(false)
             })?;
             return Ok(Reply::of_page(url, page));
@@ -180,7 +187,7 @@ impl Client {
     /// The response to a request over HTTP, redirections followed.
     pub(crate) fn respond(&self, url: &str, ask: Ask<'_>) -> Result<Response<ureq::Body>, Fault> {
         if is_stored(url) {
-            return self.ask(url, &permitted(&Stored::at(url)?.address())?, ask);
+            return self.ask(url, &signed(url, &Stored::at(url)?.address())?, ask);
         }
         let mut at = url.to_owned();
         for _ in 0..=REDIRECTIONS_MAX {
@@ -319,6 +326,25 @@ pub(crate) fn refused(url: &str, status: u16, wait: Option<Duration>) -> Fault {
     }
 }
 
+/// A signed address, which messages do not state.
+fn signed(url: &str, address: &str) -> Result<Uri, FetchError> {
+    permitted(address).map_err(|_| FetchError::Address {
+        url: url.to_owned(),
+    })
+}
+
+/// Whether a response states another version of the file than the validator of its first bytes.
+fn is_other(response: &Response<ureq::Body>, validator: Option<&str>) -> bool {
+    validator.is_some_and(|then| {
+        let name = if then.starts_with('"') {
+            "etag"
+        } else {
+            "last-modified"
+        };
+        header(response, name).is_some_and(|now| now != then)
+    })
+}
+
 fn of_response(url: &str, response: Response<ureq::Body>, ask: Ask<'_>) -> Result<Reply, Fault> {
     let status = response.status().as_u16();
     let wait = header(&response, "retry-after").and_then(|text| wait_of(text, SystemTime::now()));
@@ -327,6 +353,8 @@ fn of_response(url: &str, response: Response<ureq::Body>, ask: Ask<'_>) -> Resul
             let length = header(&response, "content-length").and_then(|text| text.parse().ok());
             (false, length)
         }
+        // Not every object store regards `If-Range`.
+        206 if ask.from > 0 && is_other(&response, ask.validator) => return Ok(Reply::OtherFile),
         206 if ask.from > 0 => match header(&response, "content-range").and_then(rest_of) {
             Some((first, length)) if first == ask.from => (true, length),
             _ => return Ok(Reply::OtherFile),
@@ -364,4 +392,27 @@ fn of_response(url: &str, response: Response<ureq::Body>, ask: Ask<'_>) -> Resul
         meta,
         body: Box::new(response.into_body().into_reader()),
     }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_longer_answer_than_the_limit_is_no_complete_one() {
+        let of = |bytes: u64| {
+            let answer = Answer {
+                is_rest: false,
+                meta: Meta::default(),
+                is_delimited: true,
+                body: Box::new(io::repeat(b' ').take(bytes)),
+            };
+            Reply::Body(answer).text(true)
+        };
+        assert_eq!(of(1_000).unwrap().len(), 1_000);
+        let Err(Fault::Lasting(failure)) = of(ANSWER_MAX + 1) else {
+            panic!("a part of an answer is taken for the whole");
+        };
+        assert!(failure.to_string().contains("longer than"), "{failure}");
+    }
 }

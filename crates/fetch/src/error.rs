@@ -178,11 +178,13 @@ pub enum FetchError {
 pub(crate) fn advice_on_object(url: &str, status: u16) -> Option<&'static str> {
     match status {
         _ if !url.starts_with("s3://") => None,
-        301 | 307 => Some("the bucket is in another region: set AWS_REGION"),
+        301 => Some("the bucket is in another region: set AWS_REGION"),
+        307 => Some("the bucket is new: run again later, or set AWS_REGION"),
         400 | 401 | 403 => Some(
             "check AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY and AWS_REGION, the rights of the key, and the clock of this computer; \
-             public buckets are read without a key",
+             public buckets are read without a key, and some stores answer so if the object does not exist",
         ),
+        404 => Some("no object has this key or prefix: correct the address"),
         _ => None,
     }
 }

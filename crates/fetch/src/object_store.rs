@@ -56,7 +56,7 @@ impl Stored {
             .filter(|(bucket, _)| !bucket.is_empty())
             .ok_or_else(|| wrong("names no bucket; expected s3://BUCKET/PREFIX/".to_owned()))?;
         let region = either(["AWS_REGION", "AWS_DEFAULT_REGION"]);
-        let region = region.map_or_else(|| REGION.to_owned(), |(_, region)| region);
+        let (region_name, region) = region.unwrap_or(("AWS_REGION", REGION.to_owned()));
         let endpoint = either(["AWS_ENDPOINT_URL_S3", "AWS_ENDPOINT_URL"]);
         // Certificates of Amazon do not cover names of buckets with a dot.
         let style = if endpoint.is_some() || bucket.contains('.') {
@@ -66,13 +66,18 @@ impl Stored {
         };
         let (name, endpoint) = endpoint.unwrap_or_else(|| {
             let amazon = format!("https://s3.{region}.amazonaws.com");
-            ("AWS_REGION", amazon)
+            (region_name, amazon)
         });
         let expected = || {
             wrong(format!(
                 "{name} leads to {endpoint:?}; expected the address of an object store: https://, or http:// on this computer"
             ))
         };
+        if endpoint.contains('@') {
+            return Err(wrong(format!(
+                "{name} contains a user name or a password; expected them in AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY"
+            )));
+        }
         permitted(&endpoint).map_err(|_| expected())?;
         let endpoint = endpoint.parse().map_err(|_| expected())?;
         let bucket = Bucket::new(endpoint, style, bucket.to_owned(), region);
@@ -130,15 +135,26 @@ impl Stored {
         mut request: impl FnMut(&str) -> Result<String, E>,
     ) -> Result<String, E> {
         let (mut rows, mut seen, mut after) = (BTreeSet::new(), BTreeSet::new(), None);
+        let mut is_empty = true;
         while seen.len() < PAGES_MAX {
             let text = request(&self.listing(after.as_deref()))?;
-            let listed = ListObjectsV2::parse_response(&text).map_err(|_| {
-                let problem = format!("the answer is not a listing of objects: {}", excerpt(&text));
+            let listed = ListObjectsV2::parse_response(&text).map_err(|error| {
+                let text = excerpt(&text);
+                let problem =
+                    format!("the answer is not a complete listing of objects ({error}): {text}");
                 refused(url, problem)
             })?;
-            self.add(&listed, &mut rows);
+            is_empty &= listed.contents.is_empty() && listed.common_prefixes.is_empty();
+            let added = self.add(&listed, &mut rows);
+            added.map_err(|problem| refused(url, problem))?;
             let Some(next) = listed.next_continuation_token else {
-                return Ok(rows.into_iter().collect());
+                // A store lists a folder that it does not have as an empty one.
+                let (url, status) = (url.to_owned(), 404);
+                return if is_empty {
+                    Err(FetchError::Status { url, status }.into())
+                } else {
+                    Ok(rows.into_iter().collect())
+                };
             };
             if !seen.insert(next.clone()) {
                 break;
@@ -149,20 +165,46 @@ impl Stored {
         Err(refused(url, problem).into())
     }
 
-    fn add(&self, listed: &ListObjectsV2Response, rows: &mut BTreeSet<String>) {
-        let below = |key: &str| key.strip_prefix(self.key.as_str()).map(str::to_owned);
+    /// Adds the rows of an answer; the problem of an object that cannot be listed.
+    fn add(
+        &self,
+        listed: &ListObjectsV2Response,
+        rows: &mut BTreeSet<String>,
+    ) -> Result<(), String> {
         let folders = listed.common_prefixes.iter();
-        let folders = folders.filter_map(|folder| Some((below(&folder.prefix)?, 0)));
+        let folders = folders.map(|folder| (&folder.prefix, Some(0)));
         let objects = listed.contents.iter();
-        let objects = objects.filter_map(|object| Some((below(&object.key)?, object.size?)));
-        // A folder that was created by itself is an object with an empty name.
-        for (name, bytes) in folders.chain(objects).filter(|(name, _)| !name.is_empty()) {
-            let mut row = String::new();
+        let objects = objects.map(|object| (&object.key, object.size));
+        for (key, bytes) in folders.chain(objects) {
+            let name = key.strip_prefix(self.key.as_str()).ok_or_else(|| {
+                format!(
+                    "the listing names {key:?}; expected names that begin with {:?}",
+                    self.key
+                )
+            })?;
+            let bytes = bytes.ok_or_else(|| format!("the listing states no size of {key:?}"))?;
+            // A folder that was created by itself is an object with an empty name.
+            if !name.is_empty() {
+                let name = in_address(name);
+                rows.insert(format!("<a href=\"{name}\">{name}</a> 00:00 {bytes}\n"));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A name as an address has it: readers of listings refuse files whose names are encoded.
+fn in_address(name: &str) -> String {
+    let mut text = String::new();
+    for letter in name.chars() {
+        if letter.is_control() || "\"'<>&?#%\\".contains(letter) {
             // Writing to a text does not fail.
-            let _ = writeln!(row, "<a href=\"{name}\">{name}</a> 00:00 {bytes}");
-            rows.insert(row);
+            let _ = write!(text, "%{:02X}", u32::from(letter));
+        } else {
+            text.push(letter);
         }
     }
+    text
 }
 
 fn refused(url: &str, problem: String) -> FetchError {
@@ -225,6 +267,11 @@ mod tests {
             ("s3://a/", [("AWS_ENDPOINT_URL", "store")], "https://"),
             (
                 "s3://a/",
+                [("AWS_ENDPOINT_URL", "https://user:word@a.gov")],
+                "AWS_ENDPOINT_URL contains a user name",
+            ),
+            (
+                "s3://a/",
                 [("AWS_ENDPOINT_URL", "http://a.gov:9000")],
                 "on this computer",
             ),
@@ -283,13 +330,19 @@ mod tests {
             asked[1].contains("continuation-token=t%2F2%3D"),
             "{asked:?}"
         );
+        let encoded = "<EncodingType>url</EncodingType>";
+        let quoted = of(&format!("{encoded}{}", object("p%2Fa%22.b", 1)));
+        let page: Result<String, FetchError> = folder.page("s3://m/p/", |_| Ok(quoted.clone()));
+        assert_eq!(page.unwrap(), "<a href=\"a%22.b\">a%22.b</a> 00:00 1\n");
         // The same continuation again and again; another answer.
+        let listing_of = |name: &str| of(&object(name, 1));
         for (answer, expected) in [
             (&*first, "does not end"),
-            (
-                "<html><title>Login</title>",
-                "not a listing of objects: Login",
-            ),
+            (&*of(""), "HTTP status 404"),
+            (&*of("<IsTruncated>true</IsTruncated>"), "complete listing"),
+            (&*of("<Contents><Key>p/a.b</Key></Contents>"), "no size"),
+            (&*listing_of("q/a.b"), "begin with"),
+            ("<html><title>Login</title>", "): Login"),
         ] {
             let page: Result<String, FetchError> =
                 folder.page("s3://m/p/", |_| Ok(answer.to_owned()));

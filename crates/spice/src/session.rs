@@ -9,7 +9,6 @@
 use std::{cell::OnceCell, ffi::CString, rc::Rc, sync::OnceLock};
 
 use nalgebra::{Matrix3, Vector3};
-use serde::{Deserialize, Serialize};
 
 use super::{
     apparent::{MarsAcceleration, orbiter_seen_from_mars, seen_from_mars},
@@ -21,40 +20,21 @@ use super::{
     needs::{LEAP_SECONDS, Need, bus_frame, camera_frame, clocks, explain},
     origin::{self, Origin, all_finite},
     role::KernelRole,
+    state::State,
     tabulated::Tabulated,
 };
 use areograph_base::{
     body::Body,
     constants::{NAIF_MARS, NAIF_SOLAR_SYSTEM_BARYCENTRE, NAIF_SUN, SPACECRAFT, Spacecraft},
     error::{Error, Locate, Result},
-    frames::{CameraFrame, J2000, Position, Rotation, SpacecraftBus},
+    frames::{CameraFrame, J2000, Rotation, SpacecraftBus},
     instruments::Instrument,
     time::{CkLookup, Et, Interval},
-    units::METRES_PER_KM,
 };
 use areograph_geom::{attitude::bus_to_camera, body_rotation::frame_rotation_3};
 
 /// Digits of a second in UTC strings for people.
 const UTC_DECIMALS: u8 = 3;
-
-/// Position and velocity relative to the centre of Mars, inertial.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct State {
-    /// Position, metres.
-    pub position: Position<J2000>,
-    /// Velocity in J2000, metres per second.
-    pub velocity_m_s: Vector3<f64>,
-}
-
-impl State {
-    fn from_km(state_km: StateKm) -> Self {
-        let [x, y, z, vx, vy, vz] = state_km.map(|value| value * METRES_PER_KM);
-        Self {
-            position: Position::new(Vector3::new(x, y, z)),
-            velocity_m_s: Vector3::new(vx, vy, vz),
-        }
-    }
-}
 
 /// Attitude of the bus at an exposure.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -138,13 +118,16 @@ impl Session {
         }
     }
 
-    /// The session for many states of its spacecraft in this interval: states are those of polynomials within 0.3 mm and
-    /// 0.01 mm/s of CSPICE, where the states that CSPICE gives between their nodes agree with them; otherwise, and
-    /// outside the interval, they are read.
+    /// The session for many states of its spacecraft in this interval: states are those of polynomials that agree with
+    /// CSPICE within 0.3 mm and 0.01 mm/s at instants between their nodes. Where they do not agree, where a segment of a
+    /// kernel ends in the interval, and outside the interval, states are read.
     #[must_use]
     pub fn tabulated(self, interval: Interval) -> Self {
+        let is_inside = |seam: &Et| interval.start < *seam && *seam < interval.stop;
+        let coverage = self.coverage();
+        let is_smooth = coverage.is_ok_and(|of| !of.seams().iter().any(is_inside));
         Self {
-            tabulated: Some(Tabulated::new(interval)),
+            tabulated: is_smooth.then(|| Tabulated::new(interval)),
             ..self
         }
     }

@@ -5,7 +5,7 @@ use std::cell::OnceCell;
 
 use nalgebra::Vector3;
 
-use super::session::State;
+use super::state::State;
 use areograph_base::{
     error::Result,
     frames::Position,

@@ -11,7 +11,8 @@ use super::{
     daf,
     error::SpiceError,
     ffi::{CkColumns, Cspice, StateKm},
-    session::{Session, State},
+    session::Session,
+    state::State,
 };
 use areograph_base::{
     error::{IoError, Locate, Result},

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use serde_json::{Value, json};
 
 use crate::{
-    cli::{output, progress::duration},
+    cli::{output, pool::cores, progress::duration},
     error::Kind,
     flow::{Campaign, CampaignAnswer, Costs, End, SiteEnd},
     service::words::counted,
@@ -175,7 +175,7 @@ fn print_size(campaign: &Campaign, costs: Option<Costs>, jobs: u16) {
     output::line(format_args!(
         "  for all sites, estimated from {}: {} with --jobs {jobs}, {:.2} GB of products, {:.0} footprints",
         counted(costs.images, "processed image"),
-        duration(costs.seconds * share / f64::from(jobs)),
+        duration(costs.seconds * share / f64::from(jobs.min(cores(None)))),
         costs.bytes as f64 * share / BYTES_PER_GB,
         costs.footprints as f64 * share,
     ));

@@ -57,7 +57,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "SITE", num_args = 1..)]
     only: Vec<String>,
     /// Number of sites that run at the same time on this machine (SPICE itself serves one at a time); by default two more
-    /// than there are cores, because sites wait for the disk.
+    /// than there are cores, at most 64. Memory grows with this number.
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=i64::from(JOBS_MAX)))]
     jobs: Option<u16>,
     /// Worker threads; by default one per core. Products do not depend on it.
@@ -114,7 +114,7 @@ fn ran(arguments: &Arguments) -> Result<ExitCode> {
         answer::plan(
             &campaign,
             costs,
-            jobs_or_default(arguments.jobs),
+            jobs_or_default(arguments.jobs, arguments.threads),
             arguments.json,
         );
         return Ok(ExitCode::SUCCESS);
@@ -224,7 +224,7 @@ fn on_this_machine(
     let mut ended: Vec<Option<SiteEnd>> = (0..all).map(|_| None).collect();
     let mut done = 0;
     in_pool(
-        jobs_or_default(arguments.jobs),
+        jobs_or_default(arguments.jobs, arguments.threads),
         &stop,
         work,
         |place, result| {

@@ -12,18 +12,18 @@ impl CampaignRows {
     /// overlap without a common image may still have shots in common, which rows do not show.
     pub fn mark_repeated(&mut self) {
         let mut pairs: BTreeSet<[String; 2]> = BTreeSet::new();
-        for pair in self.pairs.iter_mut().filter(|pair| pair.is_valid) {
+        for pair in &mut self.pairs {
             let mut images = pair.images.clone();
             images.sort_unstable();
-            pair.is_repeated = !pairs.insert(images);
+            pair.is_repeated = pair.is_valid && !pairs.insert(images);
         }
         let first = self.first_profiles();
         for (at, row) in self.profiles.iter_mut().enumerate() {
             row.is_repeated = row.is_valid && !first.contains(&at);
         }
         let mut images: BTreeSet<&str> = BTreeSet::new();
-        for row in self.images.iter_mut().filter(|row| row.is_valid) {
-            row.is_repeated = !images.insert(&row.image);
+        for row in &mut self.images {
+            row.is_repeated = row.is_valid && !images.insert(&row.image);
         }
     }
 
