@@ -70,11 +70,9 @@ fn serve(root: &Path, made: &Mutex<Vec<String>>, mut stream: TcpStream) -> std::
         let range = request.range();
         let (path, query) = request.path.split_once('?').unwrap_or((&request.path, ""));
         let value = |name: &str| {
-            let pairs = query.split('&').filter_map(|pair| pair.split_once('='));
-            let found = pairs
-                .filter(|(key, _)| *key == name)
-                .map(|(_, value)| value.replace("%2F", "/"));
-            found.last()
+            let mut pairs = query.split('&').filter_map(|pair| pair.split_once('='));
+            let (_, found) = pairs.find(|(key, _)| *key == name)?;
+            Some(found.replace("%2F", "/"))
         };
         let is_signed = value("X-Amz-Credential").is_some_and(|key| {
             key.starts_with("KEY/") && key.ends_with("/us-east-1/s3/aws4_request")

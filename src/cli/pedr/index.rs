@@ -26,9 +26,9 @@ use crate::{
 /// `run` and `pedr search` use the index automatically. Their results do not depend on it, even if it is out of date. The
 /// index of a folder is the file areograph-pedr.index in it. If the command is killed, the index remains unchanged.
 ///
-/// Of an archive on a server (https://) or in an object store (s3://BUCKET/PREFIX/), every file is streamed once, and a
-/// stand-in of each is written below the folder of --into: a few kilobytes with the place of its shots and the hashes of
-/// its blocks. All commands accept stand-ins in place of PEDR files, and read the blocks that they need from the server.
+/// Of an archive on a server (https://) or in an object store (s3://), every file is streamed once, and a stand-in of
+/// each is written below the folder of --into: a few kilobytes with the place of its shots and the hashes of its blocks.
+/// All commands accept stand-ins in place of PEDR files, and read the blocks that they need from the server.
 /// An interrupted command continues with the first incomplete file.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
