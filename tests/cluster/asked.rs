@@ -232,6 +232,17 @@ fn an_executor_may_be_killed_in_the_middle_of_a_query() {
 }
 
 #[test]
+fn a_query_without_executors_ends_with_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let archive = archive(folder.path(), 2);
+    let cluster = Cluster::of(0);
+    let waited = failed(&ask(&cluster, &archive, "select count(*) from shots"));
+    for part in ["no executor took its tasks", &cluster.url] {
+        assert!(waited.contains(part), "{part}: {waited}");
+    }
+}
+
+#[test]
 fn stand_ins_are_read_from_their_server() {
     let folder = tempfile::tempdir().unwrap();
     let archive = archive(folder.path(), 4);

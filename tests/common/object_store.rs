@@ -17,7 +17,7 @@ use super::archive_server::request_of;
 /// Objects or folders in an answer of a listing.
 const PER_ANSWER: usize = 1;
 
-/// The store; it ends with the process. A request without the key `KEY` is refused.
+/// The store; it ends with the process. A request without the key `KEY` is refused, and the first request is too many.
 #[derive(Debug, Clone)]
 pub(crate) struct ObjectStore {
     requests: Arc<Mutex<Vec<String>>>,
@@ -66,7 +66,11 @@ impl ObjectStore {
 fn serve(root: &Path, made: &Mutex<Vec<String>>, mut stream: TcpStream) -> std::io::Result<()> {
     while let Some(request) = request_of(&mut stream)? {
         stream.read_exact(&mut [0])?;
-        made.lock().unwrap().push(request.path.clone());
+        let is_first = {
+            let mut made = made.lock().unwrap();
+            made.push(request.path.clone());
+            made.len() == 1
+        };
         let range = request.range();
         let (path, query) = request.path.split_once('?').unwrap_or((&request.path, ""));
         let value = |name: &str| {
@@ -80,6 +84,7 @@ fn serve(root: &Path, made: &Mutex<Vec<String>>, mut stream: TcpStream) -> std::
             && value("X-Amz-Signature").is_some_and(|signature| signature.len() == 64);
         let key = path.trim_start_matches('/').strip_prefix("mola");
         let body = match key {
+            _ if is_first => Err(503),
             _ if !is_signed => Err(403),
             None if path == "/elsewhere/" || path == "/elsewhere" => Err(301),
             None => Err(404),

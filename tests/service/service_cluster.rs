@@ -113,9 +113,9 @@ fn a_refusal_of_the_cluster_is_the_reason_of_the_attempt() {
     assert_eq!(service.end().code(), Some(0), "{}", mission.log());
 }
 
-/// srun is killed, and its worker lives on, as on a node: it must not publish, and ends.
-#[test]
-fn a_worker_that_was_lost_does_not_publish() {
+/// A worker is lost and lives on, as on a node: it must not publish, and ends. `lose` ends its srun, whose number it receives, and
+/// returns the service that continues.
+fn lose_worker(lose: impl FnOnce(&Mission, &Path, Service, i32) -> Service) {
     let mission = mission();
     let text = fs::read_to_string(mission.file("areograph.toml")).unwrap();
     let count = text.replace("count = 2", "count = 1");
@@ -136,10 +136,10 @@ exec "$@""#;
     mission.wait_for("an attempt", || programs.join("ready").exists());
     let pid = "SELECT CAST(pid AS TEXT) FROM attempt WHERE job = 1 AND pid IS NOT NULL";
     mission.wait_for("a process", || !mission.ask(pid).is_empty());
-    let pid: i32 = mission.ask(pid).remove(0).parse().unwrap();
-    kill_process(Pid::from_raw(pid).unwrap(), Signal::KILL).unwrap();
+    let pid = mission.ask(pid).remove(0).parse().unwrap();
+    let service = lose(&mission, &programs, service, pid);
     let lost =
-        "SELECT CAST(job AS TEXT) FROM attempt WHERE job = 1 AND n = 1 AND how LIKE '%signal 9%'";
+        "SELECT CAST(job AS TEXT) FROM attempt WHERE job = 1 AND n = 1 AND ended_ms IS NOT NULL";
     mission.wait_for("the loss", || !mission.ask(lost).is_empty());
     mission.wait_for("scancel", || programs.join("cancelled").exists());
     let job = noted(&programs, "cancelled");
@@ -153,12 +153,41 @@ exec "$@""#;
     mission.wait_for("the end of the lost worker", || {
         noted(&programs, "output").contains("rename into place")
     });
-    assert!(mission.ask("SELECT id FROM run WHERE job = 1").is_empty());
+    assert!(
+        mission
+            .ask("SELECT id FROM run WHERE job = 1 AND attempt = 1")
+            .is_empty()
+    );
     shorten_waiting(&mission);
     mission.wait_for_jobs(2);
     mission.assert_clean(&site);
     assert!(place.is_file());
     assert_eq!(service.end().code(), Some(0), "{}", mission.log());
+}
+
+#[test]
+fn a_worker_that_was_lost_does_not_publish() {
+    lose_worker(|mission, _, service, srun| {
+        kill_process(Pid::from_raw(srun).unwrap(), Signal::KILL).unwrap();
+        let killed = "SELECT how FROM attempt WHERE job = 1 AND n = 1 AND how LIKE '%signal 9%'";
+        mission.wait_for("the signal", || !mission.ask(killed).is_empty());
+        service
+    });
+}
+
+/// The attempt is on the cluster, whatever the configuration states when it ends.
+#[test]
+fn an_attempt_on_the_cluster_cannot_publish_after_the_executor_was_changed() {
+    lose_worker(|mission, programs, mut service, _| {
+        service.signal(Signal::KILL);
+        service.0.wait().unwrap();
+        let file = mission.file("areograph.toml");
+        let text = fs::read_to_string(&file).unwrap();
+        let local = text.replace("kind = \"slurm\"", "kind = \"local\"");
+        assert_ne!(text, local);
+        fs::write(file, local).unwrap();
+        start(mission, programs)
+    });
 }
 
 /// Kills of the service and of all node daemons by turns, at other moments of a run each time. The queue is full first: a run may

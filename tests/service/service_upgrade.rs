@@ -243,8 +243,8 @@ fn files_of_an_earlier_version_are_kept_named_and_made_again_once() {
     );
     // The database as it was, and in the present layout.
     let layout = "SELECT CAST(user_version AS TEXT) FROM pragma_user_version";
-    assert_eq!(service.ask("before-layout-3.db", layout), ["1"]);
-    assert_eq!(service.ask("areograph.db", layout), ["3"]);
+    assert_eq!(service.ask("before-layout-4.db", layout), ["1"]);
+    assert_eq!(service.ask("areograph.db", layout), ["4"]);
     // The runs of the earlier version are there, byte for byte, and named as such.
     assert_eq!(service.runs(&former), kept);
     let versions = "SELECT version || ' ' || count(*) FROM run GROUP BY version ORDER BY version";
@@ -286,7 +286,7 @@ fn files_of_an_earlier_version_are_kept_named_and_made_again_once() {
         let _ = fs::remove_file(service.path(&format!("state/areograph.db{ending}")));
     }
     fs::rename(
-        service.path("state/before-layout-3.db"),
+        service.path("state/before-layout-4.db"),
         service.path("state/areograph.db"),
     )
     .unwrap();

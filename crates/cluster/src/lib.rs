@@ -12,6 +12,7 @@ mod named;
 mod place;
 mod processes;
 mod scan;
+mod stalled;
 mod table;
 
 pub use ask::{Unanswered, ask, failure};

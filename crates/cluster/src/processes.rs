@@ -4,7 +4,9 @@ use std::{net::SocketAddrV4, path::Path, sync::Arc};
 
 use areograph_base::error::Cause;
 use areograph_sql::{Columns, MEMORY_BYTES, datafusion::prelude::SessionContext};
-use ballista_core::{error::BallistaError, registry::BallistaFunctionRegistry};
+use ballista_core::{
+    config::TaskSchedulingPolicy, error::BallistaError, registry::BallistaFunctionRegistry,
+};
 use ballista_executor::executor_process::{ExecutorProcessConfig, start_executor_process};
 use ballista_scheduler::{
     cluster::BallistaCluster,
@@ -14,7 +16,7 @@ use ballista_scheduler::{
 use datafusion_proto::protobuf::{LogicalPlanNode, PhysicalPlanNode};
 use tokio::net::TcpListener;
 
-use super::{ask::configuration, codec::Codec, place::Place};
+use super::{ask::configuration, codec::Codec, place::Place, stalled::end_stalled};
 
 /// Seconds between signs of life of an executor.
 const HEARTBEAT_S: u64 = 2;
@@ -46,6 +48,7 @@ pub async fn schedule(
         external_host: address.ip().to_string(),
         bind_host: address.ip().to_string(),
         bind_port: address.port(),
+        scheduling_policy: TaskSchedulingPolicy::PullStaged,
         executor_timeout_seconds: LOST_S,
         no_executors_grace_period_seconds: LOST_S,
         expire_dead_executor_interval_seconds: HEARTBEAT_S,
@@ -57,6 +60,7 @@ pub async fn schedule(
     let cluster = BallistaCluster::new_from_config(&config).await?;
     let scheduler =
         create_scheduler::<LogicalPlanNode, PhysicalPlanNode>(cluster, Arc::new(config)).await?;
+    tokio::spawn(end_stalled(scheduler.clone()));
     Ok(start_grpc_service_with_listener(listener, scheduler).await?)
 }
 
@@ -85,6 +89,7 @@ pub async fn execute(
         scheduler_host: scheduler.host.clone(),
         scheduler_port: scheduler.port,
         scheduler_connect_timeout_seconds: CONNECT_S,
+        task_scheduling_policy: TaskSchedulingPolicy::PullStaged,
         vcores: tasks,
         work_dir: Some(folder.display().to_string()),
         job_data_ttl_seconds: RESULTS_S,

@@ -40,22 +40,28 @@ pub struct Attempt {
     /// Its process, once started.
     #[serde(skip)]
     pub process: Option<ProcessIdentity>,
+    /// Whether Slurm runs it; unknown for attempts of earlier versions.
+    #[serde(skip)]
+    pub is_on_cluster: Option<bool>,
 }
 
-/// Records the start of an attempt; its log is a path below the state folder.
+/// Records the start of an attempt.
+///
+/// * `is_on_cluster` – whether Slurm runs it
+/// * `log` – a path below the state folder
 ///
 /// # Errors
 /// SQLite errors.
 pub fn begin_attempt(
     transaction: &Transaction<'_>,
     now_ms: i64,
-    job: i64,
-    n: i64,
+    (job, n): (i64, i64),
+    is_on_cluster: bool,
     log: &str,
 ) -> Stored<()> {
     transaction.execute(
-        "INSERT INTO attempt (job, n, started_ms, beat_ms, log) VALUES (?1, ?2, ?3, ?3, ?4)",
-        params![job, n, now_ms, log],
+        "INSERT INTO attempt (job, n, started_ms, beat_ms, on_cluster, log) VALUES (?1, ?2, ?3, ?3, ?4, ?5)",
+        params![job, n, now_ms, is_on_cluster, log],
     )?;
     Ok(())
 }
@@ -158,5 +164,6 @@ fn attempt_row(row: &Row<'_>) -> rusqlite::Result<Attempt> {
             start: start.unsigned_abs(),
             boot_id,
         }),
+        is_on_cluster: row.get("on_cluster")?,
     })
 }

@@ -10,7 +10,7 @@ use rusqlite::Connection;
 use super::{DatabaseError, Stored, copy};
 
 /// Layout of the tables; a change raises it and adds a step to [`migrate`].
-pub(super) const VERSION: i64 = 3;
+pub(super) const VERSION: i64 = 4;
 /// Tables by which a database of the service is recognized.
 const OWN_TABLES: &str = "SELECT count(*) FROM sqlite_schema WHERE type = 'table' AND name IN ('service', 'run', 'site', 'token')";
 /// Step from layout 1: time of the last reading of the products of a run, and number of them that do not match its
@@ -19,6 +19,8 @@ const CHECKED_RUNS: &str = "ALTER TABLE run ADD COLUMN checked_ms INTEGER;
     ALTER TABLE run ADD COLUMN damaged INTEGER NOT NULL DEFAULT 0;";
 /// Step from layout 2: body of a site, which its next plan states.
 const BODIES: &str = "ALTER TABLE site ADD COLUMN body TEXT NOT NULL DEFAULT 'mars';";
+/// Step from layout 3: whether Slurm runs an attempt, which is unknown for earlier ones.
+const CLUSTERS: &str = "ALTER TABLE attempt ADD COLUMN on_cluster INTEGER;";
 const SCHEMA: &str = include_str!("schema.sql");
 
 /// A free path in `folder` for a file that is moved aside or copied: `stem.db`, `stem_2.db` and so on.
@@ -72,7 +74,7 @@ pub(super) fn migrate(connection: &mut Connection, folder: &Path) -> Stored<()> 
     match found {
         None => transaction.execute_batch(SCHEMA)?,
         Some(layout) => {
-            let steps = [CHECKED_RUNS, BODIES].into_iter().zip(1..);
+            let steps = [CHECKED_RUNS, BODIES, CLUSTERS].into_iter().zip(1..);
             for (step, _) in steps.filter(|(_, from)| *from >= layout) {
                 transaction.execute_batch(step)?;
             }
@@ -93,7 +95,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(DATABASE);
         drop(Database::open(folder.path()).unwrap());
-        let former = "ALTER TABLE run DROP COLUMN checked_ms; ALTER TABLE run DROP COLUMN damaged; ALTER TABLE site DROP COLUMN body;
+        let former = "ALTER TABLE run DROP COLUMN checked_ms; ALTER TABLE run DROP COLUMN damaged; ALTER TABLE site DROP COLUMN body; ALTER TABLE attempt DROP COLUMN on_cluster;
             INSERT INTO fact VALUES ('a', 'b'); PRAGMA user_version = 1";
         Connection::open(&path)
             .unwrap()
@@ -101,13 +103,14 @@ mod tests {
             .unwrap();
         // The copy of an earlier migration, after a return to the former layout.
         let copies =
-            ["before-layout-3.db", "before-layout-3_2.db"].map(|name| folder.path().join(name));
+            ["before-layout-4.db", "before-layout-4_2.db"].map(|name| folder.path().join(name));
         #[allow(clippy::disallowed_methods, reason = "an earlier copy for a test")]
         fs::write(&copies[0], "earlier").unwrap();
         let database = Database::open(folder.path()).unwrap();
         let found = database.read(|connection| {
             connection.prepare("SELECT checked_ms, damaged FROM run")?;
             connection.prepare("SELECT body FROM site")?;
+            connection.prepare("SELECT on_cluster FROM attempt")?;
             let sql = "SELECT value FROM fact WHERE name = 'a'";
             Ok(connection.query_row(sql, [], |row| row.get::<_, String>(0))?)
         });
@@ -122,7 +125,8 @@ mod tests {
     fn a_site_of_layout_2_has_a_body() {
         let folder = tempfile::tempdir().unwrap();
         drop(Database::open(folder.path()).unwrap());
-        let former = "ALTER TABLE site DROP COLUMN body;
+        let former =
+            "ALTER TABLE site DROP COLUMN body; ALTER TABLE attempt DROP COLUMN on_cluster;
             INSERT INTO site (name, file, config_blake3, enabled) VALUES ('a', 'a.toml', '', 1);
             PRAGMA user_version = 2";
         let path = folder.path().join(DATABASE);
@@ -137,6 +141,6 @@ mod tests {
             Ok(connection.query_row(sql, [], |row| row.get::<_, String>(0))?)
         });
         assert_eq!(found.unwrap(), "mars");
-        assert!(folder.path().join("before-layout-3.db").is_file());
+        assert!(folder.path().join("before-layout-4.db").is_file());
     }
 }

@@ -79,6 +79,8 @@ CREATE INDEX cause_job ON cause (job);
 CREATE TABLE attempt (
   job INTEGER NOT NULL REFERENCES job (id) ON DELETE CASCADE, n INTEGER NOT NULL,
   pid INTEGER, pid_start INTEGER, boot_id TEXT,
+  -- Whether Slurm runs it; NULL for attempts of a layout before 4.
+  on_cluster INTEGER,
   started_ms INTEGER NOT NULL, beat_ms INTEGER NOT NULL, rss_kib INTEGER, stage TEXT, done INTEGER, of INTEGER, unit TEXT,
   ended_ms INTEGER, how TEXT, exit INTEGER, signal INTEGER, log TEXT NOT NULL,
   PRIMARY KEY (job, n)

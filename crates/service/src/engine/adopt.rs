@@ -60,16 +60,19 @@ fn adopt_jobs<W: Workers>(core: &Core<W>) -> Result<()> {
                 .shared
                 .read(|connection| attempts::attempts(connection, job.id, 1))?;
             let newest = rows.into_iter().next();
-            if core.shared.config().executor.kind == ExecutorKind::Slurm
-                && let Some(newest) = &newest
-            {
-                let run = run_id(newest.started_utc.0, job.id, job.attempt);
-                srun::cancel(&srun::job_name(&run));
+            let attempt = attempt_of(core, &job, newest.as_ref());
+            if attempt.is_on_cluster {
+                srun::cancel(&srun::job_name(&attempt.run));
             }
-            if let Some(process) = newest.as_ref().and_then(|newest| newest.process.as_ref()) {
-                end(process);
+            if let Some(process) = newest.and_then(|newest| newest.process) {
+                end(&process);
             }
-            finish_for(core, &job, newest)?;
+            let ended = Ended {
+                how: How::Cancelled,
+                answer: None,
+                rss_peak_kib: 0,
+            };
+            finish(core, &attempt, &ended, Some(CancelWhy::Shutdown))?;
         }
     }
     Ok(())
@@ -90,23 +93,25 @@ fn end(process: &ProcessIdentity) {
     tracing::warn!("process {} cannot be ended", process.pid);
 }
 
-fn finish_for<W: Workers>(core: &Core<W>, job: &Job, newest: Option<AttemptRow>) -> Result<()> {
-    let ended = Ended {
-        how: How::Cancelled,
-        answer: None,
-        rss_peak_kib: 0,
-    };
-    let attempt = Attempt {
+/// The attempt of a job that an earlier service left.
+fn attempt_of<W: Workers>(core: &Core<W>, job: &Job, newest: Option<&AttemptRow>) -> Attempt {
+    let none = Attempt {
         job: job.id,
         n: job.attempt,
         site: job.site.clone(),
-        run: newest
-            .as_ref()
-            .map(|newest| run_id(newest.started_utc.0, job.id, job.attempt))
-            .unwrap_or_default(),
-        stage: newest.and_then(|newest| newest.stage),
+        ..Attempt::default()
     };
-    finish(core, &attempt, &ended, Some(CancelWhy::Shutdown)).map(|_| ())
+    let Some(newest) = newest else {
+        return none;
+    };
+    Attempt {
+        run: run_id(newest.started_utc.0, job.id, job.attempt),
+        is_on_cluster: newest
+            .is_on_cluster
+            .unwrap_or_else(|| core.shared.config().executor.kind == ExecutorKind::Slurm),
+        stage: newest.stage.clone(),
+        ..none
+    }
 }
 
 /// Removes incomplete runs, records those unknown to the database, and follows the link.

@@ -117,7 +117,9 @@ impl Taken {
 /// # Errors
 /// The database cannot be written.
 pub fn take<W: Workers>(core: &Core<W>, at_work: &AtWork) -> Stored<Option<Taken>> {
-    let count = usize::from(core.shared.config().workers.count);
+    let config = core.shared.config();
+    let count = usize::from(config.workers.count);
+    let is_on_cluster = config.executor.kind == ExecutorKind::Slurm;
     let queued = core
         .shared
         .read(|connection| jobs_in(connection, JobState::Queued))?;
@@ -133,7 +135,7 @@ pub fn take<W: Workers>(core: &Core<W>, at_work: &AtWork) -> Stored<Option<Taken
         while let Some(next) = next_queued(transaction, now_ms, backfill)? {
             if let Some(why) = waits.of(&next.site) {
                 hold(transaction, now_ms, &next, &why)?;
-            } else if let Some(begun) = begin(transaction, now_ms, &next)? {
+            } else if let Some(begun) = begin(transaction, now_ms, &next, is_on_cluster)? {
                 return Ok(Some(begun));
             }
         }
@@ -151,6 +153,7 @@ pub fn take<W: Workers>(core: &Core<W>, at_work: &AtWork) -> Stored<Option<Taken
             n: job.attempt,
             site: job.site.clone(),
             run: run_id(now_ms, job.id, job.attempt),
+            is_on_cluster,
             ..Attempt::default()
         };
         Taken {
@@ -168,6 +171,7 @@ fn begin(
     transaction: &Transaction<'_>,
     now_ms: i64,
     next: &Job,
+    is_on_cluster: bool,
 ) -> Stored<Option<(Job, String, String)>> {
     let site = site(transaction, &next.site)?.filter(|site| site.enabled);
     let Some(site) = site else {
@@ -191,8 +195,8 @@ fn begin(
     begin_attempt(
         transaction,
         now_ms,
-        job.id,
-        job.attempt,
+        (job.id, job.attempt),
+        is_on_cluster,
         &log_of(job.id, job.attempt),
     )?;
     Ok(Some((job, site.file, site.config_blake3)))
@@ -226,15 +230,16 @@ pub async fn follow<W: Workers>(core: Arc<Core<W>>, taken: Taken) -> Option<Run>
         "started"
     );
     let ended = {
-        let is_on_cluster = config.executor.kind == ExecutorKind::Slurm;
         let mut task = core.task(job.id, attempt.n, what);
-        if is_on_cluster {
+        if attempt.is_on_cluster {
             // Nodes do not have the folder of the state.
             task.hashes_file = products.join(HASHES);
         }
         let limits = core.limits(config.workers.deadline_s);
         let log = config.outputs.state.join(log_of(job.id, attempt.n));
-        let srun = is_on_cluster.then(|| Srun::of(&config, &attempt.run));
+        let srun = attempt
+            .is_on_cluster
+            .then(|| Srun::of(&config, &attempt.run));
         let heard = |heard: Heard<'_>| hear(&core, &mut attempt, heard);
         core.workers
             .work(srun.as_ref(), task, limits, &log, cancel.clone(), heard)

@@ -27,7 +27,6 @@ use crate::{
     },
 };
 use areograph_base::error::{Error, Result};
-use areograph_config::ExecutorKind;
 
 /// An attempt, and its last report.
 #[derive(Debug, Clone, Default)]
@@ -40,6 +39,8 @@ pub struct Attempt {
     pub site: String,
     /// Its run.
     pub run: String,
+    /// Whether Slurm runs it.
+    pub is_on_cluster: bool,
     /// The current stage.
     pub stage: Option<String>,
 }
@@ -173,8 +174,7 @@ fn fruit<W: Workers>(core: &Core<W>, attempt: &Attempt, ended: &Ended) -> Result
     let products = core.shared.config().outputs.products.clone();
     let folder = runs(&products, &attempt.site).join(&attempt.run);
     let has_run = !attempt.run.is_empty();
-    let is_on_cluster = core.shared.config().executor.kind == ExecutorKind::Slurm;
-    if has_run && is_on_cluster && ended.answer.is_none() {
+    if has_run && attempt.is_on_cluster && ended.answer.is_none() {
         // A worker on a lost node may still work: it publishes before this, or not at all. Even an srun that started no worker may
         // have left its job in the queue.
         bar(&folder)?;
