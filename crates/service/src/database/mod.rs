@@ -346,7 +346,7 @@ mod tests {
             .unwrap();
         drop(connection);
         let refused = Database::open(folder.path()).unwrap_err().to_string();
-        assert!(refused.contains("has layout 4"), "{refused}");
+        assert!(refused.contains("has layout 5"), "{refused}");
         let mut bytes = fs::read(&path).unwrap();
         bytes[4096..8192].fill(0xff);
         #[allow(clippy::disallowed_methods, reason = "a damaged file for a test")]
