@@ -386,7 +386,7 @@ mod tests {
             with("PRAGMA user_version = 0")(path);
         });
         assert_eq!(kind, Kind::Input, "{text}");
-        assert!(text.contains("its layout is 0; expected 1 to 3"), "{text}");
+        assert!(text.contains("its layout is 0; expected 1 to 4"), "{text}");
         let (kind, text) = refused(&|path| fs::create_dir(path).unwrap());
         assert_eq!(kind, Kind::Input, "{text}");
         assert!(text.contains("not a regular file"), "{text}");
