@@ -230,6 +230,11 @@ fn images_and_profiles_of_several_sites_count_once() {
         repeated.collect::<Vec<_>>(),
         [false, true, false, false, false, true, true, false]
     );
+    let repeated = rows.images.iter().map(|row| row.is_repeated);
+    assert_eq!(
+        repeated.collect::<Vec<_>>(),
+        [false, false, true, false, true, false]
+    );
     let found = pool_sites("test", &rows);
     assert_eq!((found.image_rows, found.images.images), (6, 3));
     let ranges = found.ranges.unwrap();
