@@ -63,6 +63,7 @@ fn request(search_cells: u32, similarity: Option<Similarity>) -> MatchRequest {
     MatchRequest {
         options: MatchOptions {
             segment_points: 15,
+            segment_drift: None,
             least_variance_m2: 1_000.0,
             similarity,
             search_cells,

@@ -125,6 +125,7 @@ impl Arguments {
         Ok(MatchRequest {
             options: MatchOptions {
                 segment_points: usize::from(self.segment_points),
+                segment_drift: None,
                 least_variance_m2: self.least_variance,
                 similarity: match self.similarity {
                     Measure::Auto => None,

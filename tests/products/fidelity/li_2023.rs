@@ -438,7 +438,8 @@ static ROWS: [Row; 25] = [
             ours: group_size,
         },
         note: "The paper does not state the cell size of 35.8 m, so the value of 321 depends on another source; 15 \
-               points would require cells of 1.7 m. The text uses at most 15 points and cites a different equation. \
+               points would require cells of 1.7 m. The text uses at most 15 points and cites a different equation; \
+               `laser.segment_drift_m_per_km` of a calibration applies eq. 16. \
                The 126 \
                strips with 125,749 points, of which more than 10,000 (one tenth) are kept in 150 clusters, require \
                data.",

@@ -210,6 +210,7 @@ fn run_model(folder: &Path) -> PathBuf {
     let request = MatchRequest {
         options: MatchOptions {
             segment_points: 15,
+            segment_drift: None,
             least_variance_m2: 1_000.0,
             similarity: None,
             search_cells: 15,

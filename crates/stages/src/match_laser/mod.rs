@@ -251,11 +251,13 @@ fn matched(
     if shots.shots.is_empty() {
         return Err(no_shots("the model", grid.edges_rad()).into());
     }
-    let segments = shots.segments(options.segment_points, asked.held_back);
+    let [down_m, right_m] = grid.cell_m();
+    let length = shots.segment_length(options, down_m.min(right_m));
+    let segments = shots.segments(length, asked.held_back);
     let kept: Vec<&[Shot]> = segments
         .iter()
         .copied()
-        .filter(|segment| is_kept(grid, segment, options))
+        .filter(|segment| is_kept(grid, segment, length, options.least_variance_m2))
         .collect();
     let units = known.map_or_else(
         || units_of(grid, &kept, asked.held_back, options.seed),

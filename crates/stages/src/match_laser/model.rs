@@ -53,6 +53,9 @@ impl Input for LaserKeys<'_> {
         let laser = self.0;
         inputs.setting("laser.search_cells", &laser.search_cells);
         inputs.setting("laser.segment_points", &laser.segment_points);
+        if let Some(drift) = laser.segment_drift_m_per_km {
+            inputs.setting("laser.segment_drift_m_per_km", &drift);
+        }
         inputs.setting("laser.least_variance_m2", &laser.least_variance_m2);
         inputs.setting("laser.least_score", &laser.least_score);
         inputs.setting("laser.limit_m", &laser.limit_m);
@@ -103,6 +106,7 @@ impl Stage for MatchModel<'_> {
         let seed = u64::from(laser.seed);
         let options = MatchOptions {
             segment_points: laser.segment_points as usize,
+            segment_drift: laser.segment_drift_m_per_km.map(|drift| drift / 1_000.0),
             least_variance_m2: laser.least_variance_m2,
             similarity: None,
             search_cells: laser.search_cells,

@@ -22,6 +22,10 @@ use areograph_geom::height_grid::HeightGrid;
 pub struct MatchOptions {
     /// Maximum number of points of a segment.
     pub segment_points: usize,
+    /// Drift of the images against the laser, metres per metre of ground; with it, segments are as long as a drift of one cell
+    /// permits, regardless of `segment_points`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub segment_drift: Option<f64>,
     /// Population variance of laser heights that a segment must exceed, m².
     pub least_variance_m2: f64,
     /// The measure; `None` selects `pearson` where the median bias exceeds a tenth of the relief, or 100 m, otherwise

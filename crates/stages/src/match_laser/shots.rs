@@ -26,8 +26,10 @@ const JUMP_RAD: f64 = 0.1 * std::f64::consts::PI / 180.0;
 const PAUSE_S: f64 = 30.0;
 /// A segment ends at a gap of three spacings of shots, which come every 0.1 s.
 const GAP_S: f64 = 0.3;
-/// Share of a segment's points that must have a height in the model.
-const COVERED: f64 = 13.0 / 15.0;
+/// Share of a segment's points that must have a height in the model: so many of so many.
+const COVERED: [usize; 2] = [13, 15];
+/// Points of the shortest segment by drift, those of the paper's program: [`COVERED`] requires 13 of them.
+const DRIFT_POINTS_MIN: usize = 15;
 /// Edges to the east and the north of a rectangle of ground that is withheld or not, metres: a few units of shots, and
 /// two segments of a profile, which runs north or south; and the radius at which they have this length, metres.
 const HELD_BACK_M: [f64; 2] = [5_000.0, 10_000.0];
@@ -224,36 +226,170 @@ impl Shots {
         self.tracks = self.shots.last().map_or(0, |last| last.track + 1);
     }
 
-    /// Segments: at most `points` shots of one track without a gap, either all or none of them on withheld ground.
+    /// The length of segments by the options.
+    pub(super) fn segment_length(&self, options: &MatchOptions, cell_m: f64) -> SegmentLength {
+        match options.segment_drift {
+            None => SegmentLength::Points(options.segment_points),
+            Some(drift) => SegmentLength::ByDrift(segment_points(cell_m, drift, self.spacing_m())),
+        }
+    }
+
+    /// Median distance between successive shots, metres; 0 without any.
+    fn spacing_m(&self) -> f64 {
+        let near = self
+            .shots
+            .windows(2)
+            .filter(|pair| is_near(&pair[0], &pair[1]));
+        let mut spacings_m: Vec<f64> = near
+            .map(|pair| {
+                let [east_m, north_m] =
+                    [0, 1].map(|axis| pair[1].plan_m[axis] - pair[0].plan_m[axis]);
+                east_m.hypot(north_m)
+            })
+            .collect();
+        spacings_m.sort_by(f64::total_cmp);
+        spacings_m.get(spacings_m.len() / 2).copied().unwrap_or(0.0)
+    }
+
+    /// Segments of one track without a gap, either all or none of their shots on withheld ground.
     pub(super) fn segments(
         &self,
-        points: usize,
+        length: SegmentLength,
         held_back: Option<HeldBackGround>,
     ) -> Vec<&[Shot]> {
         let runs = self.shots.chunk_by(|a, b| {
-            let is_near = a.track == b.track && b.tag_s - a.tag_s < GAP_S;
-            is_near && a.is_held_back(held_back) == b.is_held_back(held_back)
+            is_near(a, b) && a.is_held_back(held_back) == b.is_held_back(held_back)
         });
-        runs.flat_map(|run| run.chunks(points)).collect()
+        match length {
+            SegmentLength::Points(points) => runs.flat_map(|run| run.chunks(points)).collect(),
+            SegmentLength::ByDrift(points) => {
+                runs.flat_map(|run| equal_parts(run, points)).collect()
+            }
+        }
     }
 }
 
+/// The length of segments.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum SegmentLength {
+    /// Of this number of shots; the last one of a run is shorter.
+    Points(usize),
+    /// Equal parts of a run, of at most this number of shots.
+    ByDrift(usize),
+}
+
+impl SegmentLength {
+    /// Shots of a segment that must have a height in the model.
+    fn needed(self, segment: &[Shot]) -> usize {
+        let points = match self {
+            Self::Points(points) => points,
+            Self::ByDrift(_) => segment.len().max(DRIFT_POINTS_MIN),
+        };
+        let [of, all] = COVERED;
+        (of * points).div_ceil(all)
+    }
+}
+
+/// Whether two shots follow each other in a track without a gap.
+fn is_near(a: &Shot, b: &Shot) -> bool {
+    a.track == b.track && b.tag_s - a.tag_s < GAP_S
+}
+
+/// Largest number of shots over which images drift by at most one cell of the model, at least 1.
+///
+/// * `cell_m` – cell of the model, metres
+/// * `drift` – of the images against the laser, metres per metre of ground: the drift of one line over its ground size
+/// * `spacing_m` – distance between shots, metres
+///
+/// # Source
+/// Li et al. 2023, eq. 16.
+fn segment_points(cell_m: f64, drift: f64, spacing_m: f64) -> usize {
+    let points = cell_m / (drift * spacing_m);
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "positive; large numbers saturate"
+    )]
+    let points = points.max(1.0) as usize;
+    points
+}
+
+/// A run in the smallest number of equal parts of at most `points` shots; lengths differ by at most one.
+fn equal_parts(run: &[Shot], points: usize) -> impl Iterator<Item = &[Shot]> {
+    let parts = run.len().div_ceil(points);
+    let bound = move |part: usize| part * run.len() / parts;
+    (0..parts).map(move |part| &run[bound(part)..bound(part + 1)])
+}
+
 /// Whether a segment has relief, and enough of it lies on the model.
-pub(super) fn is_kept(grid: &HeightGrid, segment: &[Shot], options: &MatchOptions) -> bool {
-    let needed = (COVERED * options.segment_points as f64).ceil();
+pub(super) fn is_kept(
+    grid: &HeightGrid,
+    segment: &[Shot],
+    length: SegmentLength,
+    least_variance_m2: f64,
+) -> bool {
     let covered = segment
         .iter()
         .filter(|shot| grid.probed_m(&shot.probe, [0, 0]).is_some());
     let count = segment.len() as f64;
     let mean_m = segment.iter().map(|shot| shot.height_m).sum::<f64>() / count;
     let squares = segment.iter().map(|shot| (shot.height_m - mean_m).powi(2));
-    covered.count() as f64 >= needed && squares.sum::<f64>() / count > options.least_variance_m2
+    covered.count() >= length.needed(segment) && squares.sum::<f64>() / count > least_variance_m2
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use areograph_testing::shot_cases::{CASES, path, source};
+
+    /// Shots 300 m apart to the north, in tracks of these lengths.
+    fn tracks(lengths: &[usize]) -> Shots {
+        let mut shots = Shots::default();
+        for (track, length) in lengths.iter().enumerate() {
+            for number in 0..*length {
+                shots.shots.push(Shot {
+                    name: String::new(),
+                    tag_s: 0.1 * number as f64,
+                    longitude_rad: 0.0,
+                    latitude_rad: 0.0,
+                    radius_m: RADIUS_M,
+                    height_m: 0.0,
+                    cell: [0.0; 2],
+                    probe: Probe::at([0.0; 2]),
+                    plan_m: [10.0 * track as f64, 300.0 * number as f64],
+                    track,
+                });
+            }
+        }
+        shots
+    }
+
+    #[test]
+    fn segments_by_drift_are_equal_parts_of_a_run() {
+        // Table 1 of Li et al. 2023: cells of 35.8 m, pixels of 26.9 m, 0.01 m per line, shots 300 m apart.
+        assert_eq!(segment_points(35.8, 0.01 / 26.9, 300.0), 321);
+        assert_eq!(segment_points(35.8, 1.0, 300.0), 1);
+        let shots = tracks(&[33, 16, 15, 4]);
+        assert!((shots.spacing_m() - 300.0).abs() < 1e-9); // rounding of kilometres
+        assert!(tracks(&[1]).spacing_m() == 0.0);
+        let lengths = |length| {
+            let segments = shots.segments(length, None);
+            segments.iter().map(|of| of.len()).collect::<Vec<_>>()
+        };
+        assert_eq!(
+            lengths(SegmentLength::ByDrift(15)),
+            [11, 11, 11, 8, 8, 15, 4]
+        );
+        assert_eq!(
+            lengths(SegmentLength::Points(15)),
+            [15, 15, 3, 15, 1, 15, 4]
+        );
+        assert_eq!(lengths(SegmentLength::ByDrift(321)), [33, 16, 15, 4]);
+        let needed = |length: SegmentLength, of: usize| length.needed(&tracks(&[of]).shots);
+        assert_eq!(needed(SegmentLength::ByDrift(321), 33), 29);
+        assert_eq!(needed(SegmentLength::ByDrift(321), 8), 13);
+        assert_eq!(needed(SegmentLength::Points(15), 8), 13);
+    }
 
     #[test]
     fn files_with_the_same_shots_are_refused() {
