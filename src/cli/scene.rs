@@ -106,9 +106,15 @@ struct MissionArguments {
         value_parser = boresight
     )]
     boresight_mrad: Option<[f64; 2]>,
+    /// Pairs of narrow-angle images of each site, 1 to 5: further pairs are a quarter of a year apart, with their own errors.
+    #[arg(long, value_name = "COUNT", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=5))]
+    pairs: u32,
     /// Further laser passes over each site of narrow-angle images, on days without an image, 0 to 1000.
     #[arg(long, value_name = "COUNT", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=1000))]
     passes: u32,
+    /// Tie points of each site, 2 to 10000, in all images that show their place; fewer where the images hardly overlap.
+    #[arg(long, value_name = "COUNT", default_value_t = 154, value_parser = clap::value_parser!(u32).range(2..=10_000))]
+    ties: u32,
     /// Also write tie points at laser shots, up to 320 a site, as matching by areograph measures them
     #[arg(long)]
     ties_at_shots: bool,
@@ -359,7 +365,9 @@ fn mission(arguments: &MissionArguments) -> Result<(), Error> {
     let options = SceneOptions {
         seed: *seed,
         day_s: arguments.day_s,
+        pairs: arguments.pairs,
         passes: arguments.passes,
+        ties: arguments.ties,
         ties_at_shots: arguments.ties_at_shots,
         errors: arguments.errors(),
     };

@@ -24,7 +24,9 @@ use areograph::{
 const SHORT: SceneOptions = SceneOptions {
     seed: 3,
     day_s: 1_800.0,
+    pairs: 1,
     passes: 0,
+    ties: 154,
     ties_at_shots: false,
     errors: SceneErrors::demo(),
 };

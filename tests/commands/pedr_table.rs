@@ -137,7 +137,9 @@ fn file(change: impl Fn(&mut Vec<Record>)) -> File {
     let options = SceneOptions {
         seed: 3,
         day_s: 600.0,
+        pairs: 1,
         passes: 0,
+        ties: 154,
         ties_at_shots: false,
         errors: SceneErrors::demo(),
     };

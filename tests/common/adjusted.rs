@@ -36,7 +36,9 @@ static MISSION: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
     let options = SceneOptions {
         seed: 5,
         day_s: 1_800.0,
+        pairs: 1,
         passes: 0,
+        ties: 154,
         ties_at_shots: false,
         errors: SceneErrors::demo(),
     };

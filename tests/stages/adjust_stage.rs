@@ -89,6 +89,7 @@ impl Site {
                 turn_rad_s: Vector3::zeros(),
                 expected_m: Vector3::zeros(),
                 line_delay: None,
+                pass: None,
                 laser_axes: None,
             })
             .collect();

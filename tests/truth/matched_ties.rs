@@ -196,7 +196,9 @@ fn matched_ties_of_realistic_images_are_kept_and_heights_scatter_as_stated() {
         let ground = TrueGround::of(&SceneOptions {
             seed: seed.into(),
             day_s: 600.0,
+            pairs: 1,
             passes: 0,
+            ties: 154,
             ties_at_shots: false,
             errors: SceneErrors::realistic(roughness),
         });

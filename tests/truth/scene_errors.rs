@@ -71,7 +71,9 @@ impl Mission {
         let options = SceneOptions {
             seed,
             day_s: 600.0,
+            pairs: 1,
             passes: 0,
+            ties: 154,
             ties_at_shots: false,
             errors,
         };

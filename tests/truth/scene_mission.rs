@@ -39,7 +39,9 @@ use serde_json::Value;
 const SHORT: SceneOptions = SceneOptions {
     seed: 3,
     day_s: 1_800.0,
+    pairs: 1,
     passes: 2,
+    ties: 154,
     ties_at_shots: false,
     errors: SceneErrors::demo(),
 };

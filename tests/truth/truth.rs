@@ -24,6 +24,7 @@ mod misregistration;
 mod mistakes;
 mod orbit;
 mod overlays;
+mod pairs;
 mod parts;
 mod profiles;
 mod readings;

@@ -6,8 +6,8 @@ use rayon::prelude::*;
 /// Rows and columns of a block: nearly all work is in products of matrices, which nalgebra computes faster than it solves
 /// triangular equations.
 const BLOCK: usize = 64;
-/// Right-hand sides that one task solves.
-const COLUMNS: usize = 64;
+/// Right-hand sides that one task solves: with fewer, products of matrices take as long to arrange the factor as to multiply.
+const COLUMNS: usize = 256;
 /// Least operations of a task, about a millisecond: to give a smaller one to another thread takes as long as to do it.
 const TASK_OPERATIONS: usize = 1 << 25;
 

@@ -45,6 +45,8 @@ use areograph_pds::ties::ties_table;
 
 /// Seconds of frames in the file of an image: the slews of an image off nadir take longer.
 const PEDR_S: f64 = 300.0;
+/// Tie points of a pair.
+const TIES: u32 = 154;
 /// Fewest and most pairs, and single images.
 const PAIRS: [f64; 2] = [1.0, 200.0];
 const SINGLES: [f64; 2] = [0.0, 200.0];
@@ -299,9 +301,11 @@ impl<'a> Tied<'a, '_> {
     ) -> Result<PairTruth<'a>> {
         let site = &place.id;
         let mut random = Random::new(seed, &format!("ties {site}"));
-        let exact = exact_ties(self.pair, terrain, &mut random)?;
+        let exact = exact_ties(self.pair, TIES, terrain, &mut random)?;
         let apart = exact.iter().filter_map(|tie| {
-            let [first, second] = &tie.measures;
+            let [(_, first), (_, second)] = &tie.measures[..] else {
+                return None;
+            };
             let first = self.stated[0].of_ground(&tie.ground_m, first)?;
             let second = self.stated[1].of_ground(&tie.ground_m, second)?;
             Some([first, second])
@@ -311,7 +315,7 @@ impl<'a> Tied<'a, '_> {
         let [first, second] = [mean(&first), mean(&second)];
         let sizes = &errors.sizes;
         let noise = TieNoise::of(sizes).stated_as(sizes, self.noise_px);
-        let (mut measured, truth) = spoil(exact, noise, &mut random);
+        let (mut measured, truth) = spoil(exact, self.pair.len(), noise, &mut random);
         for measure in measured.iter_mut().flat_map(|tie| &mut tie.measures) {
             measure.sigma_px = Some([self.noise_px; 2]);
         }

@@ -163,6 +163,19 @@ pub(super) fn image_start(session: &Session, image: &PlannedImage) -> Result<Et>
     session.sclk_to_et(image.sclk_start)
 }
 
+/// A clock string as in labels: seconds and ticks, without partition and leading zeros.
+pub(super) fn clock_reading(clock: &str) -> String {
+    let without_partition = clock.trim().rsplit('/').next().unwrap_or_default();
+    let parts = without_partition.split(['.', ':', '-']);
+    let parts: Vec<&str> = parts
+        .map(|part| match part.trim_start_matches('0') {
+            "" => "0",
+            digits => digits,
+        })
+        .collect();
+    parts.join(":")
+}
+
 /// Attitude samples of an arc in the columns of a C-kernel.
 struct AttitudeColumns {
     instants: Vec<Et>,

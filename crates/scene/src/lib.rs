@@ -7,6 +7,7 @@
 //! | `orbit`, `versions` | the true orbit of a day, and two rivals with errors of metres |
 //! | `attitude`, `arc` | pointing, and orbit and attitude solved so that an image shows its site |
 //! | `terrain`, `roughness`, `laser` | the ground, and laser shots on it in PEDR frames |
+//! | `further_pairs` | further image pairs of the sites, in earlier months |
 //! | `further_passes` | laser passes on days without an image |
 //! | `images` | the six images, pixel by pixel |
 //! | `context` | wide-angle images around two of the six, a fourth site |
@@ -51,6 +52,7 @@ mod drawn;
 mod error;
 mod error_sources;
 mod files;
+mod further_pairs;
 mod further_passes;
 mod images;
 mod kernels;
@@ -114,8 +116,13 @@ pub struct SceneOptions {
     pub seed: u64,
     /// Seconds of frames in the files of full days, 600 to 90 000; other files hold at most one revolution.
     pub day_s: f64,
+    /// Narrow-angle image pairs of each site, 1 to 5: those beyond the first are further passes, each a quarter of a year before the
+    /// one before it.
+    pub pairs: u32,
     /// Further laser passes over each site of narrow-angle images, on days without an image.
     pub passes: u32,
+    /// Tie points of each site at random places of its images, 2 to 10 000; fewer where the images hardly overlap.
+    pub ties: u32,
     /// Whether each site also has tie points at laser shots, as matching by areograph measures them.
     pub ties_at_shots: bool,
     /// Errors of the data, and the relief.
@@ -123,12 +130,15 @@ pub struct SceneOptions {
 }
 
 impl Default for SceneOptions {
-    /// Seed 1, days of 24 h, no further passes, no tie points at shots, errors of the worked example.
+    /// Seed 1, days of 24 h, one pair and 154 tie points a site as in the paper at Gusev, no further passes, no tie points at shots,
+    /// errors of the worked example.
     fn default() -> Self {
         Self {
             seed: 1,
             day_s: areograph_base::units::SECONDS_PER_DAY,
+            pairs: 1,
             passes: 0,
+            ties: 154,
             ties_at_shots: false,
             errors: SceneErrors::demo(),
         }

@@ -1,6 +1,6 @@
 //! The synthetic mission, from plan to folder.
 
-use std::{collections::BTreeMap, path::Path};
+use std::path::Path;
 
 use super::{
     SceneOptions, SceneSummary,
@@ -10,6 +10,7 @@ use super::{
     error::SceneError,
     error_sources::AltimeterErrors,
     files::{Draft, put},
+    further_pairs::FurtherImage,
     further_passes::FurtherPass,
     images::{Coder, write_images},
     kernels::{
@@ -17,32 +18,34 @@ use super::{
         write_planets_of, write_text_kernels,
     },
     laser::{LaserErrors, Shot},
-    orbit::Orbit,
     pedr::{PedrRequest, frame_tags, write_pedr},
-    plan::{IMAGES, LOST_IMAGE, SITES, Site},
+    plan::{IMAGES, LOST_IMAGE, PlannedImage, SITES, Site},
     profile_shift::ProfileShift,
     sites::{README, planned_label, planned_site},
     terrain::Terrain,
-    ties::{TieNoise, ties_name, write_ties},
+    ties::{TieNoise, TiesWanted, ties_name, write_ties},
     truth::{
         ContextTruth, DrawnTruth, FileTruth, ImageTruth, KeptShot, OrbitDifference, ProfileTruth,
         Truth,
     },
-    versions::Version,
 };
 use areograph_base::{
-    body::{Datum, MARS_IAU2000},
+    body::Datum,
     error::{IoError, Locate, Result},
     time::Et,
     watch::Watch,
 };
-use areograph_geom::{body_rotation::body_matrix, ellipsoid::Spherical};
+use areograph_geom::ellipsoid::Spherical;
 use areograph_pds::ties::ties_table;
 use nalgebra::Vector3;
 use serde::Serialize;
 
 /// Fewest and most seconds of frames in a day's file.
 const DAY_S: [f64; 2] = [600.0, 90_000.0];
+/// Fewest and most pairs of a site: earlier ones would precede the laser's mapping mission.
+const PAIRS: [f64; 2] = [1.0, 5.0];
+/// Fewest and most tie points of a site.
+const TIES: [f64; 2] = [2.0, 10_000.0];
 /// Least and largest noise of tie points, within the margin that images keep for it.
 const TIE_NOISE_PX: [f64; 2] = [0.0, 5.0];
 
@@ -102,11 +105,15 @@ pub(super) fn write(
 ) -> Result<SceneSummary> {
     check(options)?;
     let draft = Draft::begin(directory, README)?;
-    let fly = |arc: Arc<'static>| {
+    let fly = |arc| {
         let errors = DayErrors::draw(&options.errors, &arc, options.seed);
         Flown { arc, errors }
     };
-    let (arcs, passes) = write_kernels(&draft, options)?;
+    let further = further_images(&draft, options.pairs)?;
+    let further: Vec<PlannedImage<'_>> = further.iter().map(FurtherImage::image).collect();
+    let planned: Vec<&PlannedImage<'_>> =
+        { IMAGES.iter().chain([&LOST_IMAGE]).chain(&further) }.collect();
+    let (arcs, passes) = write_kernels(&draft, &planned, options)?;
     let days: Vec<Flown> = arcs.into_iter().map(fly).collect();
 
     let TrueGround(terrain) = TrueGround::of(options);
@@ -139,28 +146,26 @@ pub(super) fn write(
             .iter()
             .filter(|flown| flown.arc.image.site.id == site.id)
             .collect();
-        if let [first, second] = own[..] {
-            let noise = TieNoise::of(&options.errors);
+        if own.len() > 1 {
             let recorded = recorded_m
                 .iter()
                 .filter(|of| options.ties_at_shots && of.site == site.id);
             let shots_m: Vec<Vector3<f64>> = recorded.flat_map(|of| &of.shots_m).copied().collect();
-            let pair = write_ties(
-                &ties,
-                [first, second],
-                &terrain,
-                (noise, &shots_m),
-                options.seed,
-            )?;
-            let arcs = [&first.arc, &second.arc];
+            let wanted = TiesWanted {
+                count: options.ties,
+                noise: TieNoise::of(&options.errors),
+                shots_m: &shots_m,
+            };
+            let measured = write_ties(&ties, &own, &terrain, &wanted, options.seed)?;
+            let arcs: Vec<&Arc<'_>> = own.iter().map(|flown| &flown.arc).collect();
             let has_pixels = images.is_some_and(|(_, sites, _)| is_of(site, sites));
             let passes: Vec<&FurtherPass> = passes
                 .iter()
                 .filter(|pass| pass.site.id == site.id)
                 .collect();
-            let file = planned_site(site, arcs, &passes, &options.errors, &pair, has_pixels);
+            let file = planned_site(site, &arcs, &passes, &options.errors, &measured, has_pixels);
             put(&sites.join(format!("{}.toml", site.id)), &file.to_toml())?;
-            truth.ties.push(pair);
+            truth.ties.push(measured);
         }
     }
     truth.wide_angle = write_context(&draft, &days, &kept, &terrain, options)?;
@@ -203,6 +208,8 @@ impl<'a> Recorded<'a> {
 fn check(options: &SceneOptions) -> Result<()> {
     let named = [
         ("day_s", options.day_s, DAY_S),
+        ("pairs", options.pairs.into(), PAIRS),
+        ("ties", options.ties.into(), TIES),
         ("tie_noise_px", options.errors.tie_noise_px, TIE_NOISE_PX),
     ];
     for (option, value, [least, most]) in named {
@@ -266,18 +273,24 @@ pub(super) fn write_as_truth(draft: &Draft, truth: &impl Serialize) -> Result<()
     put(&path, &text)
 }
 
+/// Writes the text kernels; returns the images of further pairs by their clock.
+fn further_images(draft: &Draft, pairs: u32) -> Result<Vec<FurtherImage>> {
+    let kernels = draft.folder("kernels")?;
+    write_text_kernels(&kernels)?;
+    FurtherImage::all(pairs, &clock_session(&kernels)?)
+}
+
 /// Solves the arcs and writes their kernels, those of further passes, and labels of the delivered images.
-fn write_kernels(
+fn write_kernels<'a>(
     draft: &Draft,
+    planned: &[&'a PlannedImage<'a>],
     options: &SceneOptions,
-) -> Result<(Vec<Arc<'static>>, Vec<FurtherPass>)> {
+) -> Result<(Vec<Arc<'a>>, Vec<FurtherPass>)> {
     let kernels = draft.folder("kernels")?;
     let labels = draft.folder("labels")?;
-    write_text_kernels(&kernels)?;
     let session = clock_session(&kernels)?;
-    let mut arcs = IMAGES
+    let mut arcs = planned
         .iter()
-        .chain([&LOST_IMAGE])
         .map(|image| {
             let start = image_start(&session, image)?;
             Arc::new(image, start, image.pedr_duration_s(options.day_s))
@@ -336,7 +349,7 @@ fn write_pass(
     })?;
     let mut profile = ProfileTruth::new(pass.site.id, &name, &kept);
     profile.orbit_differences =
-        orbit_differences(&pass.versions(options.seed), pass.orbit(), &kept);
+        OrbitDifference::of(&pass.versions(options.seed), pass.orbit(), &kept);
     profile.profile_shift = Some(pass.shift.clone());
     let recorded = Recorded::of(pass.site.id, &pass.shift, &kept);
     Ok((file, profile, recorded))
@@ -407,39 +420,12 @@ fn write_day<'a>(
     context.retain(|kept| in_context(&kept.truth));
     let mut profile = ProfileTruth::new(image.site.id, &image.pedr_name(), &kept);
     profile.image = Some(image.id);
-    profile.orbit_differences = orbit_differences(&versions(arc, options.seed), &arc.orbit, &kept);
+    profile.orbit_differences =
+        OrbitDifference::of(&versions(arc, options.seed), &arc.orbit, &kept);
     Ok(Day {
         file,
         profile,
         recorded: Recorded::of(image.site.id, &flown.errors.profile_shift, &kept),
         kept: context,
     })
-}
-
-/// Differences of the versions of an orbit from the truth over the shots of a profile.
-fn orbit_differences(
-    versions: &[Version; 3],
-    orbit: &Orbit,
-    kept: &[KeptShot],
-) -> BTreeMap<&'static str, OrbitDifference> {
-    let difference = |version: &Version| {
-        let mean_m = mean(kept.iter().map(|kept| {
-            let KeptShot { truth, .. } = kept;
-            let rival_m =
-                body_matrix(&MARS_IAU2000, truth.et) * version.position_m(orbit, truth.et);
-            truth.range_m - (rival_m - truth.told_ground_m).norm()
-        }));
-        let difference = OrbitDifference {
-            radial_along_cross_m: version.offset_m.into(),
-            expected_range_minus_distance_mean_m: mean_m,
-        };
-        (version.family, difference)
-    };
-    versions.iter().map(difference).collect()
-}
-
-/// Mean of some values, 0 of none.
-fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
-    let count = values.len().max(1) as f64;
-    values.sum::<f64>() / count
 }

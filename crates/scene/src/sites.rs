@@ -184,7 +184,7 @@ pub(super) fn window(site: &Site, [east_deg, north_deg]: [f64; 2]) -> Window {
 /// have pixels.
 pub(super) fn planned_site<'a>(
     site: &'a Site,
-    arcs: [&Arc; 2],
+    arcs: &[&Arc<'_>],
     passes: &[&FurtherPass],
     errors: &SceneErrors,
     ties: &TiesTruth,
@@ -197,15 +197,20 @@ pub(super) fn planned_site<'a>(
         (note.to_owned(), [1.6, 1.0])
     };
     let ties_with_noise = |noise_px: f64| {
-        let [first, second] = ties
-            .cameras
-            .each_ref()
-            .map(|camera| camera.focal_px_per_line);
+        let per_line = ties.cameras.iter().map(|camera| camera.focal_px_per_line);
+        let per_line: Vec<f64> = per_line.collect();
+        let lines = if let [first, second] = per_line[..] {
+            format!("{first:.2} and {second:.2} focal-plane pixels in the two images")
+        } else {
+            let least = per_line.iter().copied().fold(f64::INFINITY, f64::min);
+            let most = per_line.iter().copied().fold(0.0, f64::max);
+            let images = per_line.len();
+            format!("{least:.2} to {most:.2} focal-plane pixels in the {images} images")
+        };
         let note = format!(
-            "The noise of these tie points has a standard deviation of {noise_px} lines and samples; a line is \
-             {first:.2} and {second:.2} focal-plane pixels in the two images."
+            "The noise of these tie points has a standard deviation of {noise_px} lines and samples; a line is {lines}."
         );
-        let along_px = 0.5 * (first + second) * noise_px;
+        let along_px = per_line.iter().sum::<f64>() / per_line.len() as f64 * noise_px;
         (note, [(1_000.0 * along_px).round() / 1_000.0, noise_px])
     };
     let (note, sigma_px) = if is_demo {
@@ -364,7 +369,7 @@ pedr/        MOLA PEDR files: two whole days, five single revolutions; version K
              from ap20001l.b on, with --passes only: further passes over the sites
 images/      with --images only: the six narrow-angle images, as in the archive
 labels/      labels of six narrow-angle and three wide-angle images
-ties/        tie points measured in both images of a site; some are blunders
+ties/        tie points measured in the images of a site; some are blunders
 sites/       configurations for `areograph run`; gusev_context chooses among the three orbits, and has a profile
              that is not simultaneous with any image
 truth.json   true values: biases, image orientations, footprints in the windows of the sites, errors of the rival
@@ -374,6 +379,7 @@ truth.json   true values: biases, image orientations, footprints in the windows 
 Image ids, times, summing, line counts, line periods and emission angles are from Shan et al. 2005, Table 2. The
 table reports 7424 lines for E04-01275; here 8064 are exposed, as Table 4 requires. Terrain, orbits and
 attitudes are invented.
+With --pairs, further pairs of the sites were taken 89, 178, … sols earlier; ids and times of their images are invented.
 The wide-angle images of gusev_context and its profile of 2001-03-12 (ap18983l.b) are also invented.
 ";
 

@@ -1,26 +1,22 @@
-//! Tie points of an image pair, measured in images whose true times and positions differ from labels and kernels.
+//! Tie points of the images of a site, measured in images whose true times and positions differ from labels and kernels.
 
+mod measured;
 mod noise;
 
 use std::path::Path;
 
 use nalgebra::Vector3;
 
-use self::noise::Waves;
+use self::measured::BLUNDER_PX;
 use super::{
     drawn::Flown,
     error::SceneError,
     files::put,
     random::Random,
     terrain::Terrain,
-    truth::{BlunderTruth, Poses, TieCameraTruth, TieTruth, TiesTruth},
+    truth::{Poses, TieCameraTruth, TiesTruth},
 };
-use areograph_base::{
-    error::Result,
-    line_times::LineTimes,
-    ties::{TieMeasure, TiePoint},
-    time::Et,
-};
+use areograph_base::{error::Result, line_times::LineTimes, ties::TieMeasure, time::Et};
 use areograph_config::usual_instrument;
 use areograph_geom::{
     light_time::light_time_s,
@@ -29,20 +25,15 @@ use areograph_geom::{
 };
 use areograph_pds::ties::ties_table;
 
+pub(super) use measured::{Tie, spoil};
 pub(super) use noise::TieNoise;
 
-/// Tie points of a pair, as many as in the paper at Gusev; fewer where the images hardly overlap.
-const TIES: usize = 154;
-/// Tie points of a pair at laser shots, at most.
+/// Tie points of a site at laser shots, at most.
 const TIES_AT_SHOTS: usize = 320;
-/// Candidate positions of the first image for one tie point.
+/// Candidate positions of an image for one tie point.
 const PLACES_PER_TIE: usize = 20;
 /// No tie point is nearer to the edge of an image, pixels: blunders stay inside, plus noise of a pixel.
 pub(super) const EDGE_PX: f64 = BLUNDER_PX[1] + 5.0;
-/// One of this many tie points is a blunder, the first in the middle of the first group.
-const BLUNDER_EVERY: usize = 20;
-/// Shortest and longest blunder, in any direction.
-const BLUNDER_PX: [f64; 2] = [20.0, 100.0];
 /// Intervals between poses of an image, a tenth of a second each: where the rate of the bus changes, interpolation is
 /// in error by 0.1 mm on the ground.
 const INTERVALS: u32 = 160;
@@ -59,10 +50,14 @@ pub(super) struct TrueImage<'a> {
     pub(super) oriented_camera: OrientedCamera<SampledOrientation>,
 }
 
-/// A ground point and its image coordinates in both images.
-pub(super) struct Tie {
-    pub(super) ground_m: Vector3<f64>,
-    pub(super) measures: [TieMeasure<String>; 2],
+/// Tie points and laser shots of a site.
+pub(super) struct TiesWanted<'a> {
+    /// Tie points at random places.
+    pub(super) count: u32,
+    /// Their noise.
+    pub(super) noise: TieNoise,
+    /// Places of laser shots, IAU 2000, metres: those that two images show are tie points as well.
+    pub(super) shots_m: &'a [Vector3<f64>],
 }
 
 impl<'a> TrueImage<'a> {
@@ -288,32 +283,31 @@ fn no_camera(flown: &Flown, error: &dyn std::error::Error) -> SceneError {
     }
 }
 
-/// Writes the tie points of a pair into `folder`, measured with noise.
+/// Writes the tie points of the images of a site into `folder`, measured with noise.
 ///
-/// * `shots_m` – places of laser shots, IAU 2000, metres: those that both images show are tie points as well
+/// * `days` – its images in order of time: a pair, or several one after the other
 ///
 /// # Errors
 /// [`SceneError::NoCamera`]; errors of writing.
 pub(super) fn write_ties<'a>(
     folder: &Path,
-    [first, second]: [&'a Flown<'a>; 2],
+    days: &[&'a Flown<'a>],
     terrain: &Terrain,
-    (noise, shots_m): (TieNoise, &[Vector3<f64>]),
+    wanted: &TiesWanted<'_>,
     seed: u64,
 ) -> Result<TiesTruth<'a>> {
-    let site = first.arc.image.site.id;
-    let pair = [
-        TrueImage::new(first, terrain)?,
-        TrueImage::new(second, terrain)?,
-    ];
+    let site = days.first().map_or("", |flown| flown.arc.image.site.id);
+    let images = days.iter().map(|flown| TrueImage::new(flown, terrain));
+    let images = images.collect::<Result<Vec<_>>>()?;
     let mut random = Random::new(seed, &format!("ties {site}"));
-    let mut exact = exact_ties(&pair, terrain, &mut random)?;
-    exact.extend(ties_at_shots(&pair, terrain, shots_m)?);
-    let (measured, truth) = spoil(exact, noise, &mut random);
+    let mut exact = exact_ties(&images, wanted.count, terrain, &mut random)?;
+    exact.extend(ties_at_shots(&images, terrain, wanted.shots_m)?);
+    let (measured, truth) = spoil(exact, images.len(), wanted.noise, &mut random);
     put(&folder.join(ties_name(site)), &ties_table(&measured))?;
+    let cameras = images.iter().map(|image| image.truth(terrain));
     Ok(TiesTruth {
         site,
-        cameras: [pair[0].truth(terrain)?, pair[1].truth(terrain)?],
+        cameras: cameras.collect::<Result<_>>()?,
         ties: truth,
     })
 }
@@ -323,102 +317,61 @@ pub(super) fn ties_name(site: &str) -> String {
     format!("{site}.csv")
 }
 
-/// Tie points distributed over the common ground of both images, measured without error.
+fn projectors<'a>(images: &'a [TrueImage<'_>]) -> Result<Vec<Projector<'a, SampledOrientation>>> {
+    images.iter().map(TrueImage::projector).collect()
+}
+
+/// The tie point at a place, measured without error in all images that show it; `None` unless two or more do.
+fn tie(
+    images: &[TrueImage<'_>],
+    projectors: &[Projector<'_, SampledOrientation>],
+    ground_m: Vector3<f64>,
+) -> Option<Tie> {
+    let seen = images.iter().zip(projectors).enumerate();
+    let measures = seen.filter_map(|(index, (image, projector))| {
+        Some((index, image.measure(projector, &ground_m)?))
+    });
+    let measures: Vec<_> = measures.collect();
+    (measures.len() > 1).then_some(Tie { ground_m, measures })
+}
+
+/// `count` tie points distributed over the common ground of images in pairs, measured without error.
 pub(super) fn exact_ties(
-    pair: &[TrueImage<'_>; 2],
+    images: &[TrueImage<'_>],
+    count: u32,
     terrain: &Terrain,
     random: &mut Random,
 ) -> Result<Vec<Tie>> {
-    let projectors = [pair[0].projector()?, pair[1].projector()?];
-    let tie = |_place| {
-        let ground_m = pair[0].any_ground_m(terrain, random)?;
-        let first = pair[0].measure(&projectors[0], &ground_m)?;
-        let second = pair[1].measure(&projectors[1], &ground_m)?;
-        Some(Tie {
-            ground_m,
-            measures: [first, second],
-        })
+    let projectors = projectors(images)?;
+    let (count, pairs) = (count as usize, images.len().div_ceil(2).max(1));
+    // Places are those of the first images of all pairs in turn.
+    let tie = |place: usize| {
+        let ground_m = images[2 * (place % pairs)].any_ground_m(terrain, random)?;
+        tie(images, &projectors, ground_m)
     };
-    let places = 0..TIES * PLACES_PER_TIE;
-    Ok(places.filter_map(tie).take(TIES).collect())
+    let places = 0..count * PLACES_PER_TIE;
+    Ok(places.filter_map(tie).take(count).collect())
 }
 
-/// Tie points at some of the places `shots_m` that both images show, evenly selected, measured without error.
+/// Tie points at some of the places `shots_m` that two images show, evenly selected, measured without error.
 fn ties_at_shots(
-    pair: &[TrueImage<'_>; 2],
+    images: &[TrueImage<'_>],
     terrain: &Terrain,
     shots_m: &[Vector3<f64>],
 ) -> Result<Vec<Tie>> {
-    let projectors = [pair[0].projector()?, pair[1].projector()?];
+    let projectors = projectors(images)?;
     let tie = |shot_m: &Vector3<f64>| {
-        let at = pair[0].measure(&projectors[0], shot_m)?;
-        let ground_m = pair[0].ground_m(terrain, at.line, at.sample)?;
-        let first = pair[0].measure(&projectors[0], &ground_m)?;
-        let second = pair[1].measure(&projectors[1], &ground_m)?;
-        Some(Tie {
-            ground_m,
-            measures: [first, second],
-        })
+        // The first image of a pair that shows the shot shows this ground.
+        let first = images.iter().zip(&projectors).step_by(2);
+        let ground_m = first.filter_map(|(image, projector)| {
+            let at = image.measure(projector, shot_m)?;
+            image.ground_m(terrain, at.line, at.sample)
+        });
+        tie(images, &projectors, { ground_m }.next()?)
     };
     let all: Vec<Tie> = shots_m.iter().filter_map(tie).collect();
     let step = all.len().div_ceil(TIES_AT_SHOTS).max(1);
     Ok(all.into_iter().step_by(step).collect())
-}
-
-/// Adds noise to all measurements, and blunders to a few.
-pub(super) fn spoil(
-    ties: Vec<Tie>,
-    noise: TieNoise,
-    random: &mut Random,
-) -> (Vec<TiePoint<String>>, Vec<TieTruth>) {
-    // Drawn apart, so that the other draws do not depend on it.
-    let mut of_waves = random.clone();
-    let waves: [[Waves; 2]; 2] = [(); 2].map(|()| [(); 2].map(|()| Waves::draw(&mut of_waves)));
-    let own_px = noise.sigma_px * (1.0 - noise.common).sqrt();
-    let common_px = noise.sigma_px * noise.common.sqrt();
-    let spoilt = ties.into_iter().enumerate().map(|(index, tie)| {
-        let id = format!("tie-{:03}", index + 1);
-        let mut measures = tie.measures.to_vec();
-        for (measure, [lines, samples]) in measures.iter_mut().zip(&waves) {
-            let common = [lines, samples].map(|of| common_px * of.at(measure.line, measure.sample));
-            measure.line += own_px * random.normal() + common[0];
-            measure.sample += own_px * random.normal() + common[1];
-        }
-        let blunder =
-            (index % BLUNDER_EVERY == BLUNDER_EVERY / 2).then(|| blunder(&mut measures, random));
-        let truth = TieTruth {
-            id: id.clone(),
-            ground_iau2000_m: tie.ground_m.into(),
-            blunder,
-        };
-        let known = None;
-        (
-            TiePoint {
-                id,
-                known,
-                measures,
-            },
-            truth,
-        )
-    });
-    spoilt.unzip()
-}
-
-/// Displaces one of the measurements by a blunder.
-fn blunder(measures: &mut [TieMeasure<String>], random: &mut Random) -> BlunderTruth {
-    let image = usize::from(random.between(0.0, 1.0) < 0.5);
-    let [least_px, most_px] = BLUNDER_PX;
-    let length_px = random.between(least_px, most_px);
-    let (sin, cos) = random.between(0.0, std::f64::consts::TAU).sin_cos();
-    let [line_error, sample_error] = [length_px * cos, length_px * sin];
-    let measure = &mut measures[image];
-    measure.line += line_error;
-    measure.sample += sample_error;
-    BlunderTruth {
-        image: measure.image.clone(),
-        line_error,
-        sample_error,
-    }
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ use super::{
     drawn::{DayErrors, Flown},
     error_sources::SceneErrors,
     laser::{CROSSOVER_AMPLITUDE_M, CROSSOVER_PERIOD_S, Shot},
+    orbit::Orbit,
     plan::{Look, PlannedImage},
     profile_shift::ProfileShift,
     versions::Version,
@@ -265,8 +266,8 @@ pub(super) struct OrbitDifference {
 #[derive(Debug, Serialize)]
 pub(super) struct TiesTruth<'a> {
     pub site: &'a str,
-    /// The two images, in the order of time.
-    pub cameras: [TieCameraTruth<'a>; 2],
+    /// The images, in the order of time.
+    pub cameras: Vec<TieCameraTruth<'a>>,
     /// In the order of the file.
     pub ties: Vec<TieTruth>,
 }
@@ -390,6 +391,32 @@ impl<'a> ImageTruth<'a> {
                 })
                 .collect(),
         }
+    }
+}
+
+impl OrbitDifference {
+    /// Differences of the versions of an orbit from the truth over the shots of a profile, by family.
+    pub(super) fn of(
+        versions: &[Version; 3],
+        orbit: &Orbit,
+        kept: &[KeptShot],
+    ) -> BTreeMap<&'static str, Self> {
+        let difference = |version: &Version| {
+            let differences_m = kept.iter().map(|kept| {
+                let KeptShot { truth, .. } = kept;
+                let rival_m =
+                    body_matrix(&MARS_IAU2000, truth.et) * version.position_m(orbit, truth.et);
+                truth.range_m - (rival_m - truth.told_ground_m).norm()
+            });
+            let difference = Self {
+                radial_along_cross_m: version.offset_m.into(),
+                // 0 of no shots.
+                expected_range_minus_distance_mean_m: differences_m.sum::<f64>()
+                    / kept.len().max(1) as f64,
+            };
+            (version.family, difference)
+        };
+        versions.iter().map(difference).collect()
     }
 }
 

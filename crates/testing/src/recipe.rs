@@ -138,6 +138,7 @@ impl<M: ExteriorOrientation> Simulated<M> {
             attitude_clock: None,
             common_bus: None,
             expected_m: Vec::new(),
+            passes: Vec::new(),
         }
     }
 }

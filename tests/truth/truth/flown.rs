@@ -251,6 +251,8 @@ pub(super) struct Plan<'a> {
     /// Noise of tie points as the site files state it, pixels.
     pub(super) noise_px: f64,
     pub(super) sizes: Sizes,
+    /// Image pairs of each site.
+    pub(super) pairs: u32,
     /// Further laser passes over each site.
     pub(super) passes: u32,
     /// Whether sites have tie points at laser shots.
@@ -275,6 +277,7 @@ impl Plan<'_> {
             ground,
             noise_px,
             sizes: Sizes::Drawn,
+            pairs: 1,
             passes: 0,
             ties_at_shots: false,
             keys: "",
@@ -300,7 +303,9 @@ impl Plan<'_> {
         let options = SceneOptions {
             seed: self.seed.into(),
             day_s: 600.0,
+            pairs: self.pairs,
             passes: self.passes,
+            ties: 154,
             ties_at_shots: self.ties_at_shots,
             errors,
         };

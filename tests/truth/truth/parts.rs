@@ -141,6 +141,7 @@ fn errors_of_one_cause_alone_are_as_large_as_their_part() {
             ground: Roughness::Medium,
             noise_px: 0.5,
             sizes: Sizes::Cited,
+            pairs: 1,
             passes: 0,
             ties_at_shots: false,
             keys: cause.keys,

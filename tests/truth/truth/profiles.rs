@@ -27,13 +27,13 @@ const MISSIONS: u32 = 3;
 const FIRST_SEED: u32 = 110_001;
 
 /// Errors of the mean of a site's tie points with their stated standard deviations, on one axis.
-struct Axis {
+pub(super) struct Axis {
     errors_m: Vec<f64>,
     sigmas_m: Vec<f64>,
 }
 
 impl Axis {
-    fn of(sites: &[&Stated], axis: usize) -> Self {
+    pub(super) fn of(sites: &[&Stated], axis: usize) -> Self {
         let means = sites.iter().map(|site| site.ties.shared);
         Self {
             errors_m: means.clone().map(|[error_m, _]| error_m[axis]).collect(),
@@ -41,27 +41,27 @@ impl Axis {
         }
     }
 
-    fn z(&self) -> impl Iterator<Item = f64> + '_ {
+    pub(super) fn z(&self) -> impl Iterator<Item = f64> + '_ {
         let pairs = self.errors_m.iter().zip(&self.sigmas_m);
         pairs.map(|(error_m, sigma_m)| error_m / sigma_m)
     }
 
-    fn ratio(&self) -> f64 {
+    pub(super) fn ratio(&self) -> f64 {
         (self.z().map(|z| z * z).sum::<f64>() / self.errors_m.len() as f64).sqrt()
     }
 
-    fn rms_m(&self) -> f64 {
+    pub(super) fn rms_m(&self) -> f64 {
         let squares = self.errors_m.iter().map(|error_m| error_m * error_m);
         (squares.sum::<f64>() / self.errors_m.len() as f64).sqrt()
     }
 
-    fn median_sigma_m(&self) -> f64 {
+    pub(super) fn median_sigma_m(&self) -> f64 {
         let mut sigmas_m = self.sigmas_m.clone();
         sigmas_m.sort_by(f64::total_cmp);
         sigmas_m[sigmas_m.len() / 2]
     }
 
-    fn beyond(&self) -> usize {
+    pub(super) fn beyond(&self) -> usize {
         self.z().filter(|z| z.abs() > 3.0).count()
     }
 }

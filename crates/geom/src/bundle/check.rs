@@ -1,6 +1,6 @@
 //! Checks of values and indices before a network is adjusted.
 
-use super::{BundleError, CommonBus, Network, Part, Spot, View};
+use super::{BundleError, CommonBus, CommonPass, Network, Part, Spot, View, unknowns::is_weighted};
 use crate::pushbroom::ExteriorOrientation;
 
 /// # Errors
@@ -44,6 +44,9 @@ pub(super) fn check<M: ExteriorOrientation>(network: &Network<M>) -> Result<(), 
             finite(part, "inertial rotation rate", *component)?;
         }
     }
+    for pass in &network.passes {
+        check_pass(network, pass)?;
+    }
     if let Some(bus) = &network.common_bus {
         check_bus(network, bus)?;
     }
@@ -83,6 +86,25 @@ fn check_view<M>(network: &Network<M>, part: Part, view: &View) -> Result<(), Bu
     finite(part, "position in the line", view.y_px)?;
     positive(part, "standard deviation", view.sigma_px.x)?;
     positive(part, "standard deviation", view.sigma_px.y)
+}
+
+fn check_pass<M>(network: &Network<M>, pass: &CommonPass) -> Result<(), BundleError> {
+    let part = Part::Images;
+    let images = network.images.len();
+    if let Some(image) = pass.images.iter().find(|image| **image >= images) {
+        let missing = Part::Image(*image);
+        return Err(BundleError::Unmatched { part, missing });
+    }
+    let is_used =
+        |image: usize, constant: usize| is_weighted(network.images[image].sigmas[3 * constant]);
+    pass.without_factor(is_used).map_or(Ok(()), |value| {
+        Err(BundleError::Value {
+            part,
+            what: "the smallest eigenvalue of the a priori correlations of one pass",
+            value,
+            expected: "a positive number",
+        })
+    })
 }
 
 fn check_bus<M>(network: &Network<M>, bus: &CommonBus) -> Result<(), BundleError> {

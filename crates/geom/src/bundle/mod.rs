@@ -91,8 +91,10 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod attitude_clock;
 mod check;
 mod common_bus;
+mod common_pass;
 mod compared_heights;
 mod control;
 mod error;
@@ -126,13 +128,17 @@ mod jitter_tests;
 #[cfg(test)]
 mod mean_parts_tests;
 #[cfg(test)]
+mod pass_tests;
+#[cfg(test)]
 mod prior_tests;
 #[cfg(test)]
 mod tests;
 
 use nalgebra::{DMatrix, Matrix3, Vector2, Vector3};
 
+pub use attitude_clock::AttitudeClock;
 pub use common_bus::{AdjustedBus, CommonBus, Estimate, RecordedProfile, SharedRotation, Spot};
+pub use common_pass::CommonPass;
 pub use control::{CommonNoise, HeightControl, Jitter};
 pub use error::BundleError;
 pub use known::KnownCoordinates;
@@ -214,18 +220,6 @@ pub struct Range {
     pub profile: usize,
 }
 
-/// An offset of the time at which attitudes were read, common to all images.
-///
-/// An image whose camera rotates inertially, as one that follows nadir does, was rotated by an amount proportional to
-/// the offset against its attitude; one that is held towards a star was not.
-#[derive(Debug, Clone, PartialEq)]
-pub struct AttitudeClock {
-    /// Standard deviation of the offset, seconds.
-    pub sigma_s: f64,
-    /// Inertial rotation rate of each image, camera components, radians per second.
-    pub turns_rad_s: Vec<Vector3<f64>>,
-}
-
 /// The input of an adjustment.
 #[derive(Debug, Clone)]
 pub struct Network<M> {
@@ -248,6 +242,8 @@ pub struct Network<M> {
     /// Expected position of each image relative to its initial orientation, Mars-fixed, metres: the a priori values of
     /// its constant position unknowns. Empty where they are zero for all.
     pub expected_m: Vec<Vector3<f64>>,
+    /// Images whose a priori orientations are correlated.
+    pub passes: Vec<CommonPass>,
 }
 
 impl<M> Default for Network<M> {
@@ -262,6 +258,7 @@ impl<M> Default for Network<M> {
             attitude_clock: None,
             common_bus: None,
             expected_m: Vec::new(),
+            passes: Vec::new(),
         }
     }
 }

@@ -4,7 +4,10 @@ use std::{fmt, ops::Range};
 
 use nalgebra::{DVector, Vector3};
 
-use super::{CommonBus, Network, ORIENTATION_UNKNOWNS, Part, SharedRotation};
+use super::{
+    CommonBus, CommonPass, Network, ORIENTATION_UNKNOWNS, Part, SharedRotation,
+    common_pass::CONSTANTS,
+};
 use crate::{boresight::BoresightAngles, pushbroom::OrientationCorrection};
 use areograph_base::units::METRES_PER_KM;
 
@@ -130,14 +133,19 @@ impl Unknown {
     }
 }
 
+/// Whether the initial value of an unknown with this standard deviation has a weight: it is neither fixed nor free.
+pub(super) fn is_weighted(sigma: f64) -> bool {
+    sigma > 0.0 && sigma.is_finite()
+}
+
 /// The unknowns that are solved for, in column order, and their standard deviations.
 pub(super) struct Columns {
     pub(super) unknowns: Vec<Unknown>,
     pub(super) sigmas: Vec<f64>,
     /// Their expected values.
     pub(super) expected: Vec<f64>,
-    /// The unknown whose multiple is added to the expected value of each, by its column, and the factor.
-    pub(super) follows: Vec<Option<(usize, f64)>>,
+    /// The unknowns whose multiples are added to the expected value of each, by their columns, and the factors.
+    pub(super) follows: Vec<Vec<(usize, f64)>>,
     /// Column of each image's 18 coefficients and its time bias.
     pub(super) of_image: Vec<[Option<usize>; ORIENTATION_UNKNOWNS + 1]>,
     /// All columns of each image; they are adjacent.
@@ -199,6 +207,9 @@ impl Columns {
             columns.line_time_of_image.push(line_time);
             columns.images.push(first..columns.len());
         }
+        for pass in &network.passes {
+            columns.add_pass(pass);
+        }
         for (profile, sigma_m) in network.range_bias_sigmas_m.iter().enumerate() {
             let first = columns.len();
             let column = columns.add(Unknown::RangeBias { profile }, *sigma_m);
@@ -233,9 +244,33 @@ impl Columns {
             self.unknowns.push(unknown);
             self.sigmas.push(sigma);
             self.expected.push(0.0);
-            self.follows.push(None);
+            self.follows.push(Vec::new());
             self.unknowns.len() - 1
         })
+    }
+
+    /// The constant unknowns of the images of a pass follow those of the images before them.
+    fn add_pass(&mut self, pass: &CommonPass) {
+        let constants = pass.images.iter().flat_map(|image| {
+            let of_image = &self.of_image[*image];
+            (0..CONSTANTS).map(move |constant| of_image[3 * constant])
+        });
+        let weighted = constants.enumerate().filter_map(|(at, column)| {
+            let column = column.filter(|column| is_weighted(self.sigmas[*column]));
+            Some((at, column?))
+        });
+        let (places, columns): (Vec<usize>, Vec<usize>) = weighted.unzip();
+        let expected: Vec<f64> = columns
+            .iter()
+            .map(|column| self.expected[*column])
+            .collect();
+        for (column, following) in columns.iter().zip(pass.following(&places)) {
+            self.sigmas[*column] = following.sigma;
+            for (before, factor) in following.of {
+                self.expected[*column] -= factor * expected[before];
+                self.follows[*column].push((columns[before], factor));
+            }
+        }
     }
 
     /// Adds the boresight angles; the a priori value of the second follows the first by their covariance.
@@ -254,7 +289,8 @@ impl Columns {
         }
         if let Some(second) = second {
             self.expected[second] = prior.angles_rad[1] - factor * prior.angles_rad[0];
-            self.follows[second] = first.filter(|_| factor != 0.0).map(|of| (of, factor));
+            let followed = first.filter(|_| factor != 0.0);
+            self.follows[second] = followed.map(|of| (of, factor)).into_iter().collect();
         }
         self.boresight = [first, second];
     }
@@ -269,14 +305,15 @@ impl Columns {
         };
         for (column, by_rotation_m) in shift.iter().zip(&shared.by_rotation_m) {
             if let Some(column) = column {
-                self.follows[*column] = Some((rotation, *by_rotation_m));
+                self.follows[*column] = vec![(rotation, *by_rotation_m)];
             }
         }
     }
 
     /// Terms of the difference between an unknown and its expected value: columns and their factors.
     pub(super) fn prior_terms(&self, column: usize) -> impl Iterator<Item = (usize, f64)> + Clone {
-        let followed = self.follows[column].map(|(other, factor)| (other, -factor));
+        let followed = self.follows[column].iter();
+        let followed = followed.map(|(other, factor)| (*other, -factor));
         std::iter::once((column, 1.0)).chain(followed)
     }
 
@@ -289,13 +326,17 @@ impl Columns {
         sum - self.expected[column]
     }
 
-    /// Pairs of blocks, ascending, that the expected value of an unknown of one connects with the other.
-    pub(super) fn connected_blocks(&self) -> impl Iterator<Item = [usize; 2]> {
-        let follows = self.follows.iter().enumerate();
-        follows.filter_map(|(column, follows)| {
-            let (other, _) = (*follows)?;
-            let [one, two] = [other, column].map(|column| self.block_of(column));
-            (one != two).then_some([one.min(two), one.max(two)])
+    /// Pairs of blocks, ascending, that the difference of an unknown from its expected value connects.
+    pub(super) fn connected_blocks(&self) -> impl Iterator<Item = [usize; 2]> + '_ {
+        (0..self.len()).flat_map(move |column| {
+            let blocks = move || {
+                let terms = self.prior_terms(column);
+                terms.map(move |(column, _)| self.block_of(column))
+            };
+            blocks().flat_map(move |one| {
+                let later = blocks().filter(move |two| one < *two);
+                later.map(move |two| [one, two])
+            })
         })
     }
 

@@ -37,6 +37,31 @@ pub(super) struct Relation {
 }
 
 impl Relation {
+    /// The same of sums over each of `parts` equal parts of the places, one after the other.
+    pub(super) fn summed_in(self, parts: usize, summed: impl Fn(Self) -> Self) -> Self {
+        let places = self.multipliers.len() / parts;
+        let part = |index: usize| {
+            let first = index * places;
+            summed(Self {
+                covariance_m2: self.covariance_m2.columns(first, places).into_owned(),
+                multipliers: self.multipliers.rows(first, places).into_owned(),
+            })
+        };
+        let parts: Vec<Self> = (0..parts).map(part).collect();
+        let columns = parts
+            .iter()
+            .flat_map(|part| part.covariance_m2.column_iter());
+        Self {
+            covariance_m2: DMatrix::from_columns(&columns.collect::<Vec<_>>()),
+            multipliers: DVector::from_iterator(
+                parts.iter().map(|part| part.multipliers.len()).sum(),
+                parts
+                    .iter()
+                    .flat_map(|part| part.multipliers.iter().copied()),
+            ),
+        }
+    }
+
     /// The weighted sum of the places.
     pub(super) fn summed(&self, of_places: &DVector<f64>) -> Self {
         let covariance_m2 = &self.covariance_m2 * of_places;

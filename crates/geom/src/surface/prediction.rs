@@ -391,18 +391,18 @@ impl LaserSurface {
         summed: impl Fn(Relation) -> Relation,
     ) -> DVector<f64> {
         let around = self.around(at);
-        let count = around.len() as f64;
-        let of_places = around.iter().map(|places| {
-            let relation = summed(self.kriging.at(places));
-            let radial_m = self.radial_m(&relation);
-            let mut variances_m2 = self.kriging.variances_m2(relation);
-            for (variance_m2, of_profiles_m) in variances_m2.iter_mut().zip(radial_m.column_iter())
-            {
-                *variance_m2 = (*variance_m2 - of_profiles_m.norm_squared()) / count;
-            }
-            variances_m2
-        });
-        of_places.sum()
+        let count = around.len();
+        // All positions are solved together: the factor of the equations is arranged for a product once.
+        let together = self.kriging.at(&around.concat());
+        let relation = together.summed_in(count, summed);
+        let radial_m = self.radial_m(&relation);
+        let mut variances_m2 = self.kriging.variances_m2(relation);
+        for (variance_m2, of_profiles_m) in variances_m2.iter_mut().zip(radial_m.column_iter()) {
+            *variance_m2 = (*variance_m2 - of_profiles_m.norm_squared()) / count as f64;
+        }
+        let places = variances_m2.len() / count;
+        let of_positions = variances_m2.as_slice().chunks(places.max(1));
+        of_positions.map(DVector::from_column_slice).sum()
     }
 
     fn radial_m(&self, relation: &Relation) -> DMatrix<f64> {

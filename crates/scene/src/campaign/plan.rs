@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 
 use super::super::{
     error::SceneError,
+    kernels::clock_reading,
     orbit::Orbit,
     plan::{Look, PlannedImage, Site},
     random::Random,
@@ -380,7 +381,7 @@ fn name(
         let separator = if place.id.is_empty() { "" } else { "_" };
         place.id = format!("{}{separator}{}", place.id, image.id.to_lowercase());
         let clock = session.et_to_sclk(image.start)?;
-        image.sclk_start = reading(&clock);
+        image.sclk_start = clock_reading(&clock);
         // The first line begins at a reading of the clock.
         image.start = session.sclk_to_et(&image.sclk_start)?;
         image.utc_start = session.et_to_utc_with(image.start, 2)?;
@@ -398,26 +399,13 @@ fn whole(value: f64) -> u32 {
     value.floor() as u32
 }
 
-/// A clock string as in labels: seconds and ticks, without partition and leading zeros.
-fn reading(clock: &str) -> String {
-    let without_partition = clock.trim().rsplit('/').next().unwrap_or_default();
-    let parts = without_partition.split(['.', ':', '-']);
-    let parts: Vec<&str> = parts
-        .map(|part| match part.trim_start_matches('0') {
-            "" => "0",
-            digits => digits,
-        })
-        .collect();
-    parts.join(":")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn clock_strings_are_those_of_labels() {
-        assert_eq!(reading("1/0668523205.082"), "668523205:82");
-        assert_eq!(reading("1/0668523205:000"), "668523205:0");
+        assert_eq!(clock_reading("1/0668523205.082"), "668523205:82");
+        assert_eq!(clock_reading("1/0668523205:000"), "668523205:0");
     }
 }

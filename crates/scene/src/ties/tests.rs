@@ -9,6 +9,8 @@ use crate::{
 };
 use areograph_geom::intersection::{IntersectionLimits, Ray, intersect};
 
+/// Tie points of a pair.
+const TIES: u32 = 154;
 const ROUGH: SceneErrors = SceneErrors::realistic(Roughness::Rough);
 
 fn flown(image: &'static PlannedImage, errors: &SceneErrors, seed: u64) -> Flown<'static> {
@@ -52,13 +54,13 @@ fn exact_ties_lie_on_the_ground_and_meet_there() {
         let days = days(site.id, &errors, seed);
         let terrain = terrain(seed, &errors);
         let pair = [0, 1].map(|image| TrueImage::new(&days[image], &terrain).unwrap());
-        let ties = exact_ties(&pair, &terrain, &mut Random::new(seed, "test")).unwrap();
+        let ties = exact_ties(&pair, TIES, &terrain, &mut Random::new(seed, "test")).unwrap();
         println!("{} seed {seed}: {} ties", site.id, ties.len());
-        assert_eq!(ties.len(), TIES, "{} seed {seed}", site.id);
+        assert_eq!(ties.len(), TIES as usize, "{} seed {seed}", site.id);
         for tie in &ties {
             let height_m = tie.ground_m.norm() - terrain.radius_m(&tie.ground_m.normalize());
             assert!(height_m.abs() < 1e-4, "{height_m}"); // metres; rays end 0.01 mm from the ground
-            let rays = [0, 1].map(|image| ray(&pair[image], &tie.measures[image]));
+            let rays = [0, 1].map(|image| ray(&pair[image], &tie.measures[image].1));
             let met = intersect(&rays, &IntersectionLimits::default()).unwrap();
             let off_m = (met.ground_m - tie.ground_m).norm();
             assert!(off_m < 1e-3, "{off_m} m"); // intersection itself stops at 0.1 mm
@@ -105,18 +107,18 @@ fn noise_and_blunders_are_as_told_with(noise_px: f64, common: f64, within: f64) 
     let days = days("isidis", &SceneErrors::demo(), 1);
     let terrain = terrain(1, &SceneErrors::demo());
     let pair = [0, 1].map(|image| TrueImage::new(&days[image], &terrain).unwrap());
-    let exact = exact_ties(&pair, &terrain, &mut Random::new(1, "test")).unwrap();
-    let required: Vec<[TieMeasure<String>; 2]> =
+    let exact = exact_ties(&pair, TIES, &terrain, &mut Random::new(1, "test")).unwrap();
+    let required: Vec<Vec<(usize, TieMeasure<String>)>> =
         exact.iter().map(|tie| tie.measures.clone()).collect();
     let noise = TieNoise {
         sigma_px: noise_px,
         common,
     };
-    let (measured, truth) = spoil(exact, noise, &mut Random::new(1, "noise"));
+    let (measured, truth) = spoil(exact, pair.len(), noise, &mut Random::new(1, "noise"));
     let (mut squares, mut count) = (0.0, 0.0);
     for ((tie, truth), required) in measured.iter().zip(&truth).zip(&required) {
         assert_eq!(tie.id, truth.id);
-        for (measure, required) in tie.measures.iter().zip(required) {
+        for (measure, (_, required)) in tie.measures.iter().zip(required) {
             let told = truth
                 .blunder
                 .as_ref()

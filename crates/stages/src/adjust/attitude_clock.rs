@@ -1,13 +1,16 @@
 //! The attitude clock of a network, as an unknown or not.
 
-use super::input::AdjustImage;
+use super::{common_pass::common_passes, input::AdjustImage};
 use areograph_config::AdjustmentConfig;
-use areograph_geom::bundle::{AttitudeClock, Network, ORIENTATION_UNKNOWNS};
+use areograph_geom::{
+    bundle::{AttitudeClock, Network, ORIENTATION_UNKNOWNS},
+    pushbroom::ExteriorOrientation,
+};
 
 /// Attributes the disagreement of images to the attitude clock.
-pub(super) fn by_attitude_clock<M>(
-    network: &mut Network<M>,
-    images: &[AdjustImage<impl Sized>],
+pub(super) fn by_attitude_clock<'a, M: ExteriorOrientation>(
+    network: &mut Network<&'a M>,
+    images: &'a [AdjustImage<M>],
     config: &AdjustmentConfig,
 ) {
     for image in &mut network.images {
@@ -20,14 +23,21 @@ pub(super) fn by_attitude_clock<M>(
         sigma_s: config.attitude_clock_sigma_s,
         turns_rad_s: images.iter().map(|image| image.turn_rad_s).collect(),
     });
+    // By the attitude clock, line times are right.
+    network.passes = common_passes(&network.images, images, 0.0);
 }
 
 /// Takes all images as equally likely to be wrong.
-pub(super) fn evenly<M>(network: &mut Network<M>, images: &[AdjustImage<impl Sized>]) {
+pub(super) fn evenly<'a, M: ExteriorOrientation>(
+    network: &mut Network<&'a M>,
+    images: &'a [AdjustImage<M>],
+    config: &AdjustmentConfig,
+) {
     for (image, of_site) in network.images.iter_mut().zip(images) {
         image.sigmas = of_site.sigmas;
     }
     network.attitude_clock = None;
+    network.passes = common_passes(&network.images, images, config.line_time_sigma_s);
 }
 
 /// Coefficients of the constant rotations about x, y and z.

@@ -344,6 +344,7 @@ mod tests {
             expected_m: Vector3::zeros(),
             turn_rad_s: Vector3::zeros(),
             line_delay: None,
+            pass: None,
             laser_axes: Some(Matrix3::identity()),
         }
     }

@@ -6,7 +6,9 @@ use super::line_times::LineDelay;
 use areograph_base::frames::{BodyFixed, Position};
 use areograph_config::{PositionUnknowns, RotationUnknowns};
 use areograph_geom::{
-    bundle::ORIENTATION_UNKNOWNS, oriented_camera::OrientedCamera, surface::LaserSurface,
+    bundle::{BundleImage, ORIENTATION_UNKNOWNS},
+    oriented_camera::OrientedCamera,
+    surface::LaserSurface,
 };
 
 /// An image with the a priori values of its orientation.
@@ -21,6 +23,8 @@ pub struct AdjustImage<M> {
     pub sigmas: [f64; ORIENTATION_UNKNOWNS],
     /// Standard deviation of a bias of the line times, seconds; 0 for no such unknown.
     pub time_bias_sigma_s: f64,
+    /// Number of its pass, whose orbit and attitude err alike in all images; `None` where images are independent.
+    pub pass: Option<usize>,
     /// Expected offset from its initial position, Mars-fixed, metres.
     pub expected_m: Vector3<f64>,
     /// Rotation rate relative to inertial space, camera components, radians per second.
@@ -33,6 +37,19 @@ pub struct AdjustImage<M> {
 }
 
 impl<M> AdjustImage<M> {
+    /// The image as the network has it.
+    pub(super) fn bundle_image(&self) -> BundleImage<&M> {
+        BundleImage {
+            base: &self.oriented_camera.orientation,
+            half_lines: 0.5 * self.oriented_camera.lines(),
+            line_period_s: self.line_period_s,
+            focal_length_px: self.oriented_camera.detector.focal_length_px,
+            distortion: self.oriented_camera.detector.distortion,
+            sigmas: self.sigmas,
+            time_bias_sigma_s: self.time_bias_sigma_s,
+        }
+    }
+
     /// Direction of the beam of a laser on the same bus, camera components.
     pub(super) fn beam(&self) -> Option<Vector3<f64>> {
         Some(self.laser_axes?.column(2).into_owned())

@@ -75,6 +75,16 @@ impl LineDelay {
         sigma_s.min(squares.sum::<f64>().sqrt().recip())
     }
 
+    /// Constant rotation that the delay which `prior_sigmas` allow for is seen as, of one standard deviation, radians.
+    pub(super) fn constant_turn_rad(
+        &self,
+        sigma_s: f64,
+        prior_sigmas: &[f64; ORIENTATION_UNKNOWNS],
+    ) -> Vector3<f64> {
+        let allowed_s = self.allowed_s(sigma_s, prior_sigmas);
+        Vector3::from_fn(|axis, _| self.seen_as[ROTATIONS + 3 * axis] * allowed_s)
+    }
+
     /// Covariance that a delay adds to an image whose unknowns have these cofactors and a priori standard deviations,
     /// and the standard deviation of the delay, seconds.
     pub(super) fn added(

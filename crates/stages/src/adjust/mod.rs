@@ -12,6 +12,8 @@
 //! giving up the elimination of points or the blocks. Covariances come from a priori variances; a good fit never
 //! reduces them.
 //!
+//! Images of one pass share the errors of its orbit and attitude (`common_pass`).
+//!
 //! Horizontal position is determined by the a priori orbit and attitude only. Three options constrain it further:
 //! - `geom/bundle/spots`: the mounting places the laser in simultaneous images (decision 0021). Boresight and profile
 //!   shifts are unknowns, also those of heights on relief.
@@ -32,6 +34,7 @@ mod boresight;
 mod boresight_prior;
 mod by_relief;
 mod common_bus;
+mod common_pass;
 mod components;
 mod error;
 mod height_summary;

@@ -7,6 +7,7 @@ use nalgebra::{Vector2, Vector3};
 use super::{
     attitude_clock::by_attitude_clock,
     boresight_prior::BoresightPrior,
+    common_pass::common_passes,
     error::AdjustError,
     input::{AdjustImage, LaserShots},
     line_times::delay_sigma_s,
@@ -21,9 +22,7 @@ use areograph_base::{
 };
 use areograph_config::AdjustmentConfig;
 use areograph_geom::{
-    bundle::{
-        BundleImage, BundlePoint, HeightControl, Jitter, KnownCoordinates, Network, Range, View,
-    },
+    bundle::{BundlePoint, HeightControl, Jitter, KnownCoordinates, Network, Range, View},
     pushbroom::{ExteriorOrientation, Projector},
 };
 
@@ -71,7 +70,7 @@ pub(super) fn assemble<'a, M: ExteriorOrientation>(
 ) -> Result<Assembled<&'a M>> {
     let mut assembled = Assembled {
         network: Network {
-            images: images.iter().map(bundle_image).collect(),
+            images: images.iter().map(AdjustImage::bundle_image).collect(),
             expected_m: images.iter().map(|image| image.expected_m).collect(),
             ..Network::default()
         },
@@ -92,6 +91,8 @@ pub(super) fn assemble<'a, M: ExteriorOrientation>(
         assembled.network.views.extend(&assembled.mola);
     }
     assembled.add_ties(images, ties, starts, config)?;
+    let delay_s = assembled.unseen_delay_s;
+    assembled.network.passes = common_passes(&assembled.network.images, images, delay_s);
     if config.attitude_clock {
         by_attitude_clock(&mut assembled.network, images, config);
     }
@@ -106,18 +107,6 @@ pub(super) fn assemble<'a, M: ExteriorOrientation>(
         });
     }
     Ok(assembled)
-}
-
-fn bundle_image<M>(image: &AdjustImage<M>) -> BundleImage<&M> {
-    BundleImage {
-        base: &image.oriented_camera.orientation,
-        half_lines: 0.5 * image.oriented_camera.lines(),
-        line_period_s: image.line_period_s,
-        focal_length_px: image.oriented_camera.detector.focal_length_px,
-        distortion: image.oriented_camera.detector.distortion,
-        sigmas: image.sigmas,
-        time_bias_sigma_s: image.time_bias_sigma_s,
-    }
 }
 
 /// Finds lines for points throughout an image.

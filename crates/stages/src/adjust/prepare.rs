@@ -33,6 +33,10 @@ use areograph_geom::{
 /// off nadir by ten degrees and more.
 const NADIR_RAD: f64 = 5.0 * RADIANS_PER_DEGREE;
 
+/// Images of a spacecraft belong to one pass if they follow each other within this time, seconds: lines of one camera show a place
+/// within minutes, and the next orbit follows after an hour and more.
+const SAME_PASS_S: f64 = 1_200.0;
+
 /// An image before the adjustment.
 #[derive(Debug, Clone)]
 pub struct Candidate<'a, M> {
@@ -99,6 +103,7 @@ impl<M: ExteriorOrientation> Candidate<'_, M> {
             line_period_s: self.times.line_times.mean_period_s(),
             sigmas,
             time_bias_sigma_s: config.time_bias_sigma_s,
+            pass: None,
         }
     }
 
@@ -198,9 +203,15 @@ pub fn prepare_adjustment<M: ExteriorOrientation>(
             }
         }
     }
-    let weighed = candidates
-        .into_iter()
-        .map(|candidate| candidate.weighed(laser, config));
+    let passes = match config.model {
+        AdjustmentModel::MolaSurface => passes(candidates.iter().map(|of| of.times)),
+        AdjustmentModel::Published => vec![None; candidates.len()],
+    };
+    let weighed = candidates.into_iter().zip(passes);
+    let weighed = weighed.map(|(candidate, pass)| AdjustImage {
+        pass,
+        ..candidate.weighed(laser, config)
+    });
     let count = profiles.len();
     let profiles = profiles.iter().map(|profile| profile.id.clone()).collect();
     let shots = LaserShots {
@@ -210,6 +221,33 @@ pub fn prepare_adjustment<M: ExteriorOrientation>(
         surface,
     };
     (weighed.collect(), shots)
+}
+
+/// The pass of each image, by number: images of one spacecraft that follow each other within a fraction of its orbit.
+fn passes<'a>(times: impl Iterator<Item = &'a ImageTimes>) -> Vec<Option<usize>> {
+    let times = times.map(|times| {
+        let platform = times.support.as_ref().map(|support| &*support.platform);
+        let spacecraft = platform.unwrap_or(&times.instrument.spacecraft.full_name);
+        (spacecraft, times.line_times.middle())
+    });
+    let times: Vec<(&str, Et)> = times.collect();
+    let mut order: Vec<usize> = (0..times.len()).collect();
+    order.sort_by(|one, other| {
+        let [one, other] = [&times[*one], &times[*other]];
+        let by_time = one.1.seconds().total_cmp(&other.1.seconds());
+        one.0.cmp(other.0).then(by_time)
+    });
+    let mut passes = vec![None; times.len()];
+    let mut pass = 0;
+    for (at, index) in order.iter().enumerate() {
+        let before = at.checked_sub(1).map(|before| times[order[before]]);
+        let (spacecraft, middle) = times[*index];
+        let is_next = before
+            .is_some_and(|(of, before)| of == spacecraft && middle.since(before) <= SAME_PASS_S);
+        pass += usize::from(!is_next);
+        passes[*index] = Some(pass);
+    }
+    passes
 }
 
 /// The range of a shot from every image that was exposed at its instant; see [`exposed`].
@@ -304,5 +342,25 @@ mod tests {
         let other = cameras.find(|camera| !camera.spacecraft.has_laser());
         elsewhere.instrument = other.unwrap().clone();
         assert!(ids(&[&elsewhere], 15.0).is_empty());
+    }
+
+    #[test]
+    fn images_of_one_spacecraft_within_minutes_are_of_one_pass() {
+        let orbit_s = 7_056.0;
+        let narrow = image("narrow", 100.0, 10_000, 1e-3);
+        let context = image("context", 90.0, 400, 0.1);
+        let next = image("next", 100.0 + orbit_s, 10_000, 1e-3);
+        let mut elsewhere = image("elsewhere", 100.0, 400, 0.1);
+        let mut cameras = all_instruments().iter();
+        let other = cameras.find(|camera| !camera.spacecraft.has_laser());
+        elsewhere.instrument = other.unwrap().clone();
+        // Whatever their order in the site file.
+        let of_images = passes([&next, &narrow, &elsewhere, &context].into_iter());
+        let [next, narrow, elsewhere, context] = of_images[..] else {
+            panic!("{of_images:?}");
+        };
+        assert_eq!(narrow, context);
+        assert!(next != narrow && elsewhere != narrow && elsewhere != next);
+        assert!(of_images.iter().all(Option::is_some));
     }
 }

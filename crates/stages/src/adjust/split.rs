@@ -50,9 +50,9 @@ pub(super) fn needs_both_readings(disagreement_m: f64, config: &AdjustmentConfig
 }
 
 /// Adjusts the remaining tie points by the other reading.
-pub(super) fn other_reading<M: ExteriorOrientation>(
-    images: &[AdjustImage<M>],
-    assembled: &Assembled<&M>,
+pub(super) fn other_reading<'a, M: ExteriorOrientation>(
+    images: &'a [AdjustImage<M>],
+    assembled: &Assembled<&'a M>,
     adjustment: &Adjustment,
     variance_factor: f64,
     bundle_options: &BundleOptions,
@@ -60,7 +60,7 @@ pub(super) fn other_reading<M: ExteriorOrientation>(
 ) -> Result<OtherReading, BundleError> {
     let mut network = assembled.network.clone();
     if config.attitude_clock {
-        evenly(&mut network, images);
+        evenly(&mut network, images, config);
     } else {
         by_attitude_clock(&mut network, images, config);
     }

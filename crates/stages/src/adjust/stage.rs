@@ -59,7 +59,7 @@ stage_inputs! {
 
 impl Stage for Adjust<'_> {
     const NAME: &'static str = "adjust";
-    const METHOD: u32 = 20;
+    const METHOD: u32 = 21;
     type Output = Adjusted;
     stage_inputs!(fingerprint);
 

@@ -83,17 +83,15 @@ pub(super) fn remarks(evidence: &Evidence<'_>) -> Vec<String> {
             .iter()
             .filter_map(|profile| far_off(profile, limits)),
     );
-    remarks.extend(corrected_too_far(evidence));
+    if evidence.ground == Some(GroundRadius::Corrected) {
+        remarks.extend(corrected_too_far(profiles, limits));
+    }
     remarks
 }
 
 /// Crossover corrections of profiles at nadir that are larger than errors of an orbit, which they correct: the ranges, which take
 /// no part in them, confirm the uncorrected radii.
-fn corrected_too_far(evidence: &Evidence<'_>) -> Vec<String> {
-    let limits = evidence.range_limits;
-    if evidence.ground != Some(GroundRadius::Corrected) {
-        return Vec::new();
-    }
+fn corrected_too_far(profiles: &[ProfileRanges], limits: &RangeCheckConfig) -> Vec<String> {
     let correction_m = |of: &ProfileRanges| {
         let [raw, corrected] = [
             of.range_minus_distance_m,
@@ -102,7 +100,7 @@ fn corrected_too_far(evidence: &Evidence<'_>) -> Vec<String> {
         corrected.mean - raw.mean
     };
     // Radii of tables without a spacecraft are corrected already; ranges beyond their own limit confirm nothing.
-    let profiles = evidence.ranges.profiles.iter().filter(|of| {
+    let profiles = profiles.iter().filter(|of| {
         of.is_judged(limits)
             && !of.is_off_nadir()
             && of.decoding_m.n > 0
@@ -159,3 +157,6 @@ fn far_off(of: &ProfileRanges, limits: &RangeCheckConfig) -> Option<String> {
         )
     })
 }
+
+#[cfg(test)]
+mod tests;
