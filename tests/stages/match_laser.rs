@@ -167,6 +167,27 @@ fn shifts_and_bias_are_those_of_the_truth() {
     assert!((bias_m - true_bias_m()).abs() < 2.0, "{bias_m} m");
 }
 
+/// Longer segments, as a drift of one cell in 40 shots permits (Li et al. 2023, eq. 16).
+#[test]
+fn segments_by_drift_have_the_shifts_of_the_truth() {
+    let cell_m = MATCHED.cell_m[0].min(MATCHED.cell_m[1]);
+    let mut longer = request(30, None);
+    // Shots are 300 m apart.
+    longer.options.segment_drift = Some(cell_m / (40.0 * 300.0));
+    let of = matched(&longer).unwrap();
+    assert!(of.verdict.valid, "{:?}", of.verdict);
+    assert!(
+        of.segments * 2 < MATCHED.segments && of.segments > 0,
+        "{} of {}",
+        of.segments,
+        MATCHED.segments
+    );
+    // As with segments of 15 shots: half a cell is what the peak of whole cells could tell.
+    let errors = errors_cells(&of);
+    assert!(errors.len() > 20, "{} units", errors.len());
+    assert!(median(errors) < 0.5);
+}
+
 /// Model minus laser with the true shift and bias at all shots of the box, by another reader of shots: root mean square, metres.
 fn true_rms_m() -> f64 {
     let shots = SCENE.path().join("shots.csv");
