@@ -155,6 +155,7 @@ fn units(folder: &Path) {
     let request = MatchRequest {
         options: MatchOptions {
             segment_points: 15,
+            segment_drift: None,
             least_variance_m2: 1_000.0,
             similarity: None,
             search_cells: SEARCH_CELLS,
