@@ -222,7 +222,8 @@ declare_table! {
         /// Maximum number of shots in a segment.
         segment_points: u32 = key(whole_from_to(3, 1_000)).or(15),
         /// Drift of the images against the laser, metres per kilometre of ground. If given, segments are as long as a
-        /// drift of one cell of the terrain model permits (Li et al. 2023, eq. 16), regardless of segment_points.
+        /// drift of one cell of the terrain model permits (Li et al. 2023, eq. 16); their maximum number of shots then does
+        /// not apply.
         segment_drift_m_per_km: Option<f64> = key(above_to(0.0, 1e4)).unused("0.37"),
         /// Height variance that a segment must exceed, square metres.
         least_variance_m2: f64 = key(above_to(0.0, 1e9)).or(1_000.0),
